@@ -37,6 +37,9 @@ pub struct Fit {
     /// its robust counterpart for other losses. `None` without degrees of freedom. If the weights are the inverses of the
     /// true standard deviations it is about 1.
     pub residual_variance: Option<f64>,
+    /// Whether the weights are the inverses of known standard deviations: the covariance is then that of these, and is not
+    /// scaled by the variance of the residuals.
+    pub absolute_deviations: bool,
     /// The cofactor matrix `(J^T J)^-1`; `None` where the data do not determine the parameters. It is the covariance of
     /// the parameters if the weights are the inverses of the true standard deviations. The rows and columns of parameters
     /// at bounds are zero: the others are judged as if these were known.
@@ -49,9 +52,20 @@ impl Fit {
         self.names.iter().position(|n| n == name).map(|i| self.parameters[i])
     }
 
-    /// The covariance of the parameters, `s^2 (J^T J)^-1`.
+    /// The covariance of the parameters, `s^2 (J^T J)^-1` with the [variance](Self::residual_variance) s^2 of the residuals;
+    /// with [known standard deviations](Self::absolute_deviations) s is 1.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        Some(self.cofactors.as_ref()? * self.residual_variance?)
+        let variance = if self.absolute_deviations { 1.0 } else { self.residual_variance? };
+        Some(self.cofactors.as_ref()? * variance)
+    }
+
+    /// How standard errors are computed, in words.
+    pub fn of_errors(&self) -> String {
+        match self.residual_variance {
+            _ if self.absolute_deviations => "standard errors are those of the given deviations".to_owned(),
+            Some(s) => format!("standard errors are scaled by the residuals, whose deviation is {:.3e}", s.sqrt()),
+            None => "there are no standard errors: as many unknowns as data".to_owned(),
+        }
     }
 
     /// The standard error of each parameter, the square root of its variance; `None` for parameters at bounds, and where
@@ -103,6 +117,9 @@ impl Display for Fit {
                 (None, Some(error)) => writeln!(f, " +- {error:.3e}")?,
                 (None, None) => writeln!(f)?,
             }
+        }
+        if self.cofactors.is_some() {
+            writeln!(f, "{}", self.of_errors())?;
         }
         if let Some(correlation) = self.correlation() {
             const LEAST_LISTED: f64 = 0.1;

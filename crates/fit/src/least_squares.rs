@@ -86,6 +86,14 @@ impl<'a, M: Model> LeastSquares<'a, M> {
         self.weights(&deviations.iter().map(|s| s.recip()).collect::<Vec<_>>())
     }
 
+    /// Declares that the weights are the inverses of known standard deviations, as those of a calibrated instrument: standard
+    /// errors are then not scaled by the size of the residuals.
+    #[must_use]
+    pub fn absolute_deviations(mut self, are_known: bool) -> Self {
+        self.settings.absolute_deviations = are_known;
+        self
+    }
+
     /// Sets the bounds of a parameter; infinite where there is none, equal for a parameter that is held fixed.
     ///
     /// # Errors

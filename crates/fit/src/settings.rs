@@ -18,6 +18,8 @@ pub(crate) struct Settings {
     /// before. Exact Jacobians have errors of 1e-15 to 1e-12; a combination of parameters whose error is 1e10 times
     /// larger than that of others is not determined in practice.
     pub rank_tolerance: f64,
+    /// Whether standard errors are those of the weights, and are not scaled by the size of the residuals.
+    pub absolute_deviations: bool,
 }
 
 impl Settings {
@@ -38,6 +40,7 @@ impl Default for Settings {
             step_bound: 100.0,
             max_evaluations: None,
             rank_tolerance: 1e-10,
+            absolute_deviations: false,
         }
     }
 }

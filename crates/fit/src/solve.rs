@@ -95,6 +95,7 @@ fn result<M: Model>(
         rank: svd.rank(),
         degrees_of_freedom: residuals.data_count().saturating_sub(free.len()),
         residual_variance: residual_variance(residuals, &best, free.len()),
+        absolute_deviations: settings.absolute_deviations,
         cofactors,
     })
 }

@@ -119,7 +119,7 @@ fn invalid_input() {
          that is to be ignored)",
         "the standard deviation of the measured value 0 is NaN; standard deviations must be positive (infinite for a \
          value that is to be ignored)",
-        "there is no parameter `c`; did you mean `a`?",
+        "there is no parameter `c`; the parameters are a, b",
         "the bounds of `a` are 2 and 1; the lower bound must not exceed the upper one (infinite where there is none)",
         "the bounds of `a` are NaN and 1; the lower bound must not exceed the upper one (infinite where there is none)",
         "the scale of the loss is 0; it must be positive and finite",

@@ -36,7 +36,10 @@ impl Formula {
             let Formula { names, graph, .. } = &mut formula;
             found.push(Parser::new(text, names, graph, ValueName::Any)?.equation()?);
         }
-        formula.sized()?.with_constraint_nodes(&found)
+        let mut formula = formula.sized()?.with_constraint_nodes(&found)?;
+        let last = formula.constraint_texts.len() - texts.len();
+        formula.constraint_texts.iter_mut().skip(last).zip(texts).for_each(|(to, text)| *to = text.trim().to_owned());
+        Ok(formula)
     }
 
     /// A formula [from a graph](Self::from_graph) with more holonomic constraints `c(q) = 0`, which are nodes of the same
@@ -69,6 +72,7 @@ impl Formula {
             }
         }
         self.constraints.extend(constraints);
+        self.constraint_texts.resize(self.constraints.len(), String::new());
         let (found, coordinates) = (self.constraints.len(), self.names.dimension);
         if found >= coordinates {
             return Err(FormulaError::Constraints { found, coordinates });
@@ -79,6 +83,11 @@ impl Formula {
     /// The number of holonomic constraints.
     pub fn constraints(&self) -> usize {
         self.constraints.len()
+    }
+
+    /// The text of a constraint; `None` where there is none, and for one that was given as a node of the graph.
+    pub fn constraint_text(&self, index: usize) -> Option<&str> {
+        self.constraint_texts.get(index).map(String::as_str).filter(|text| !text.is_empty())
     }
 
     /// Refuses resets of a formula with constraints.

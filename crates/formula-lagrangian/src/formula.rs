@@ -32,6 +32,8 @@ pub struct Formula {
     pub(crate) resets: Vec<FormulaReset>,
     /// The functions of the coordinates that vanish.
     pub(crate) constraints: Vec<Id>,
+    /// Their texts, empty for those that were given as nodes.
+    pub(crate) constraint_texts: Vec<String>,
 }
 
 impl Formula {
@@ -45,6 +47,7 @@ impl Formula {
             breaks: Vec::new(),
             resets: Vec::new(),
             constraints: Vec::new(),
+            constraint_texts: Vec::new(),
         }
     }
 

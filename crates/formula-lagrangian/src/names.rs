@@ -218,6 +218,33 @@ impl Names {
     }
 }
 
+impl Names {
+    /// The names of all functions: tables, and those of the language.
+    fn functions(&self) -> impl Iterator<Item = &str> {
+        let own = self.tables.iter().map(|table| table.name.as_str());
+        own.chain(FUNCTIONS.iter().map(|f| f.0))
+            .chain(OPERATIONS.iter().map(|o| o.0))
+            .chain(["asin", "acos", "if", "sum"])
+    }
+
+    /// The name of a function that is nearest to an unknown one.
+    pub fn nearest_function(&self, name: &str) -> Option<String> {
+        nearest_name(name, self.functions()).map(str::to_owned)
+    }
+
+    /// The functions whose names begin like an unknown one, or all of them.
+    pub fn functions_like(&self, name: &str) -> String {
+        /// The number of letters that names have in common.
+        const COMMON: usize = 3;
+        let begin = |of: &str| of.chars().take(COMMON).collect::<String>().to_lowercase();
+        let near: Vec<&str> = self.functions().filter(|known| begin(known) == begin(name)).collect();
+        match near.as_slice() {
+            [] => format!("the functions are {}", self.functions().collect::<Vec<_>>().join(", ")),
+            near => format!("functions with a similar name are {}", near.join(", ")),
+        }
+    }
+}
+
 /// Why a name cannot be that of the action.
 const ACTION_IN_USE: &str =
     "is that of the action; choose another name, or another name of the action, as in action = \"s\"";

@@ -52,6 +52,27 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
+/// The files that a command has written.
+#[derive(Debug, Default)]
+pub(crate) struct Written(Vec<PathBuf>);
+
+impl Written {
+    /// Adds a file.
+    pub fn push(&mut self, path: PathBuf) {
+        self.0.push(path);
+    }
+
+    /// Their paths.
+    pub fn paths(&self) -> Vec<String> {
+        self.0.iter().map(|path| path.display().to_string()).collect()
+    }
+
+    /// The line that names them.
+    pub fn line(&self) -> String {
+        format!("written: {}", self.paths().join(", "))
+    }
+}
+
 /// The directory of the results.
 #[derive(Clone, Debug)]
 pub(crate) struct Directory(PathBuf);

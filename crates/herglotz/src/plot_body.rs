@@ -45,9 +45,10 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
         }
         let name = |k: usize| format!("Pi{}/|Pi|", k + 1);
         let sphere = Panel {
+            equal_scales: true,
             marks: unit.first().and_then(place).into_iter().collect(),
             ..Panel::new(
-                (&name(i), widened(Axis::Linear(-1.2, 1.2, 0.4))),
+                (&name(i), Axis::Linear(-1.2, 1.2, 0.4)),
                 (&name(j), Axis::Linear(-1.2, 1.2, 0.4)),
                 (0.0, 1.0),
                 curves,
@@ -67,9 +68,10 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
             .collect();
         let fitted = axis(outline.iter().map(|p| p.0))?;
         let above = Panel {
+            equal_scales: true,
             marks: plane.first().copied().into_iter().collect(),
             ..Panel::new(
-                ("tip_x", widened(fitted)),
+                ("tip_x", fitted),
                 ("tip_y", fitted),
                 (0.0, 1.0),
                 vec![Curve::unnamed(Line::Dotted, outline), Curve::unnamed(Line::Solid, plane.iter().copied())],
@@ -79,17 +81,6 @@ pub(crate) fn of_body(body: &Body, rows: &[Vec<f64>]) -> Vec<(&'static str, Stri
         Some(("path.svg", grid(&[above, height])))
     };
     polhode().into_iter().chain(path()).collect()
-}
-
-/// The axis by half as long, as panels are half as wide again as high, so that circles are round.
-fn widened(axis: Axis) -> Axis {
-    match axis {
-        Axis::Linear(low, high, step) => {
-            let out = |end: f64| (1.5 * end.abs() / step - 1e-9).ceil() * step * end.signum();
-            Axis::Linear(out(low), out(high), step)
-        }
-        other => other,
-    }
 }
 
 fn at(v: &[f64; 3], k: usize) -> f64 {

@@ -1,5 +1,6 @@
 //! Conversion of numbers between Python and Rust; errors name the argument.
 
+use herglotz_runtime::{FormulaError, RuntimeError};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -147,6 +148,26 @@ pub fn matrix(py: Python<'_>, numbers: Vec<f64>, columns: usize) -> PyResult<Py<
 }
 
 /// The error of a column or an event, with its text.
-pub fn named<T>(what: &str, text: &str, read: Result<T, herglotz_runtime::RuntimeError>) -> PyResult<T> {
-    read.map_err(|error| value_error(format!("{what} {text:?}: {error}")))
+pub fn named<T>(what: &str, text: &str, read: Result<T, RuntimeError>) -> PyResult<T> {
+    read.map_err(|error| value_error(format!("{what} {text:?}: {}", of_runtime(error))))
+}
+
+/// The error of a formula; for an unknown name it says how a parameter gets a value.
+pub fn of_formula(mut error: FormulaError) -> FormulaError {
+    if let FormulaError::Parse(parse) = &mut error {
+        let name = parse.message.strip_prefix("unknown name `").and_then(|rest| rest.strip_suffix('`'));
+        if let (Some(name), None) = (name, &parse.nearest) {
+            parse.message += &format!("; a parameter needs a value, as in parameters={{{name:?}: 1.0}}");
+        }
+    }
+    error
+}
+
+/// The same for an error that may be that of a formula.
+pub fn of_runtime(error: RuntimeError) -> RuntimeError {
+    match error {
+        RuntimeError::Formula(error) => RuntimeError::Formula(of_formula(error)),
+        RuntimeError::Part { part, error } => RuntimeError::Part { part, error: Box::new(of_formula(*error)) },
+        error => error,
+    }
 }

@@ -1,6 +1,6 @@
 //! Ensembles: many motions of one formula.
 
-use crate::arrays::{matrix, number, numbers, table, value_error, vector, whole};
+use crate::arrays::{matrix, named, number, numbers, table, value_error, vector, whole};
 use crate::events::GivenEvent;
 use crate::motion::{self, GivenStepControl};
 use crate::run::{After, after};
@@ -243,7 +243,7 @@ pub fn run_ensemble(
     columns.extend((0..n).map(Column::Momentum));
     columns.push(Column::Action);
     for text in &observed {
-        columns.push(Column::parse(text, &system.formula).map_err(value_error)?);
+        columns.push(named("the column", text, Column::parse(text, &system.formula))?);
     }
     let (with_resets, events) = crate::events::events(events, system)?;
     let mut kept = RowStore {

@@ -74,12 +74,14 @@ pub fn fit_motion(
     nodes: Vec<f64>,
     starts: Vec<Vec<f64>>,
     max_evaluations: Option<usize>,
+    absolute_deviations: bool,
 ) -> PyResult<FitRecord> {
     let unknowns = unknowns.into_iter().map(|(name, lower, upper)| Unknown { name, lower, upper });
     let series =
         series.into_iter().map(|(quantity, times, values, deviations)| Series { quantity, times, values, deviations });
     let request = MotionFit {
         loss: loss_of(loss)?,
+        absolute_deviations,
         nodes,
         starts,
         max_evaluations,

@@ -3,7 +3,9 @@
 use crate::arrays::{matrix, named, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
-use herglotz_runtime::{EndCovector, Expression, Gradient, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status};
+use herglotz_runtime::{
+    EndCovector, Expression, Gradient, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status,
+};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;

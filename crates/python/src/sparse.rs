@@ -1,6 +1,6 @@
 //! Motions of systems of many coordinates.
 
-use crate::arrays::{number, numbers, value_error};
+use crate::arrays::{number, numbers, of_runtime, value_error};
 use crate::run::{Record, RowStore, record};
 use crate::signals::Signals;
 use herglotz_runtime::{
@@ -85,6 +85,6 @@ fn run(
             let outcome = system.run(&motion, &mut kept)?;
             Ok::<_, RuntimeError>((kept, outcome))
         })
-        .map_err(value_error)?;
+        .map_err(|error| value_error(of_runtime(error)))?;
     record(py, kept, outcome)
 }

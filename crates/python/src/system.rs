@@ -1,6 +1,6 @@
 //! Systems given by a formula.
 
-use crate::arrays::value_error;
+use crate::arrays::{of_formula, value_error};
 use crate::table::Table;
 use contact_geom::table::Table as Samples;
 use herglotz_runtime::{Formula, FormulaError, FormulaNames, FormulaSymmetry};
@@ -68,17 +68,20 @@ impl Additions {
         let tables: Vec<(&str, Samples)> =
             self.tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
         let names = FormulaNames { tables: &tables, ..FormulaNames::new(coordinates, parameters) };
-        let mut formula = kind.formula(text, names).map_err(value_error)?;
+        let mut formula = kind.formula(text, names).map_err(|error| value_error(of_formula(error)))?;
         for (coordinate, text) in &self.forces {
             let with = formula.with_force(coordinate, text);
-            formula = with.map_err(|error| value_error(format!("the force on {coordinate:?}: {error}")))?;
+            formula =
+                with.map_err(|error| value_error(format!("the force on {coordinate:?}: {}", of_formula(error))))?;
         }
         for text in &self.rayleigh {
-            formula = formula.with_rayleigh(text).map_err(|error| value_error(format!("`rayleigh`: {error}")))?;
+            formula = formula
+                .with_rayleigh(text)
+                .map_err(|error| value_error(format!("`rayleigh`: {}", of_formula(error))))?;
         }
         for text in &self.constraints {
             let with = formula.with_constraints(&[text.as_str()]);
-            formula = with.map_err(|error| value_error(format!("the constraint {text:?}: {error}")))?;
+            formula = with.map_err(|error| value_error(format!("the constraint {text:?}: {}", of_formula(error))))?;
         }
         formula.with_breaks(&self.breaks).map_err(value_error)
     }

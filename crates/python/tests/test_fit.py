@@ -125,3 +125,31 @@ def test_residuals_are_plotted():
     found = spring({"x": position(T)})
     ax = found.plot_residuals(ax=figure.Figure().subplots())
     assert len(ax.lines) == 2 and ax.get_ylabel() == "residual"
+
+
+def test_standard_errors_are_scaled_unless_sigma_is_absolute():
+    """For a sigma of twice the size, errors stay or double."""
+    t = np.linspace(0.0, 3.0, 25)
+    data = {"x": np.cos(t) + 0.01 * np.sin(9.0 * t)}
+
+    def fitted(sigma, **more):
+        given = dict(coordinates=["x"], parameters={"k": 1.1}, sigma=sigma, **more)
+        return hz.fit("x'^2/2 - k*x^2/2", [1.0], [0.0], t, data, ["k"], **given)
+
+    one, other = fitted(0.01), fitted(0.02)
+    assert abs(one.error("k") / other.error("k") - 1) < 1e-6
+    assert "standard errors are scaled by the residuals" in str(one)
+    one, other = fitted(0.01, absolute_sigma=True), fitted(0.02, absolute_sigma=True)
+    assert abs(2 * one.error("k") / other.error("k") - 1) < 1e-6
+    # The covariance is the inverse of J^T J.
+    assert abs(one.error("k") * np.linalg.norm(one.jacobian) - 1) < 1e-9
+    assert "those of the given deviations" in str(one)
+    for sigma in (None, {}):
+        with pytest.raises(ValueError, match="`absolute_sigma` is given without `sigma`"):
+            fitted(sigma, absolute_sigma=True)
+
+
+def test_parameters_of_data_alone_are_used():
+    t = np.linspace(0.0, 3.0, 7)
+    found = hz.fit("x'^2/2 - x^2/2", [1.1], [0.0], t, {"a*x": 2 * np.cos(t)}, ["x"], coordinates=["x"], parameters={"a": 2.0})
+    assert abs(found["x"] - 1.0) < 1e-9

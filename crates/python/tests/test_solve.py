@@ -189,3 +189,12 @@ def test_coordinates_of_different_size_have_their_own_scales():
     for scales, message in [([1.0], "has 1 numbers"), ([1.0, 0.0], "positive"), ([1.0, "a"], "scales")]:
         with pytest.raises(ValueError, match=message):
             error(scales=scales)
+
+
+@pytest.mark.parametrize("n", range(1, 10))
+def test_scales_are_taken_for_any_number_of_coordinates(n):
+    """Also where they are computed with additional coordinates at rest."""
+    names = [f"x{i}" for i in range(n)]
+    L = " + ".join(f"{name}'^2/2 - {name}^2/2" for name in names)
+    sol = hz.solve(L, np.ones(n), np.zeros(n), 1.0, coordinates=names, scales=np.full(n, 2.0), accuracy=1e-9)
+    assert np.abs(sol.q[-1] - np.cos(1.0)).max() < 1e-8

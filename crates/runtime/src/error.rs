@@ -5,7 +5,7 @@ use discrete_herglotz::constraints::ConstraintError;
 use discrete_herglotz::{
     CheckpointError, InputError, StepError, UnknownIntegrator, ensemble::EnsembleError, sensitivity::SensitivityError,
 };
-use formula_lagrangian::FormulaError;
+use formula_lagrangian::{Formula, FormulaError};
 use sparse_herglotz::SparseError;
 use thiserror::Error;
 
@@ -119,6 +119,14 @@ pub enum RuntimeError {
         /// What was requested.
         what: &'static str,
     },
+    /// A constraint that is not satisfied at the start, or follows from the others there.
+    #[error("{}", of_constraint(.error, .text))]
+    Constraint {
+        /// The error, with the index of the constraint.
+        error: ConstraintError,
+        /// The text of the constraint.
+        text: String,
+    },
     /// H is not defined at the start.
     #[error("the Hamiltonian or one of its derivatives is not finite at the start; choose a start inside its domain")]
     HamiltonianUndefined,
@@ -198,6 +206,20 @@ impl From<SensitivityError> for RuntimeError {
 }
 
 impl RuntimeError {
+    /// The error with the text of the constraint that it concerns, if the formula has it.
+    pub(crate) fn with_constraint_of(self, formula: &Formula) -> Self {
+        let RuntimeError::Input(InputError::Constraint(
+            error @ (ConstraintError::OffConstraint { index, .. } | ConstraintError::RankDeficient { index, .. }),
+        )) = self
+        else {
+            return self;
+        };
+        match formula.constraint_text(index) {
+            Some(text) => RuntimeError::Constraint { error, text: format!("{text:?}") },
+            None => self,
+        }
+    }
+
     /// The error of an invalid argument: its name, and what is wrong with it.
     pub(crate) fn argument(argument: &'static str, why: impl Into<String>) -> Self {
         RuntimeError::Argument { argument, why: why.into() }
@@ -231,17 +253,12 @@ pub fn in_words(error: &InputError) -> String {
         InputError::Hypothesis { hypothesis } => {
             format!("the integrator requires {hypothesis}; choose another integrator")
         }
-        InputError::Constraint(ConstraintError::OffConstraint { distance, index, value }) => format!(
-            "the start is off the constraints by the distance {distance:e}: constraint {index} has the value \
-             {value:e}; give a start on the constraints, or request its projection with `project`"
-        ),
+        InputError::Constraint(
+            error @ (ConstraintError::OffConstraint { index, .. } | ConstraintError::RankDeficient { index, .. }),
+        ) => of_constraint(error, &index.to_string()),
         InputError::Constraint(ConstraintError::OffVelocity { distance }) => format!(
             "the initial velocity violates the constraints by the velocity {distance:e}; give a velocity that is \
              tangent to them, or request its projection with `project`"
-        ),
-        InputError::Constraint(ConstraintError::RankDeficient { rank, expected }) => format!(
-            "the constraints are dependent at the start: {rank} of {expected} are independent; remove those that \
-             follow from others, or start at another position"
         ),
         InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
         InputError::Forced { method } => format!(
@@ -250,6 +267,22 @@ pub fn in_words(error: &InputError) -> String {
         ),
         InputError::NoIntegrator => "steps are given without an integrator; give one".to_owned(),
         InputError::NoSteps => "neither steps nor an accuracy is given; give one of them".to_owned(),
+        error => error.to_string(),
+    }
+}
+
+/// The error of a constraint with its text or its index.
+fn of_constraint(error: &ConstraintError, constraint: &str) -> String {
+    match error {
+        ConstraintError::OffConstraint { distance, value, .. } => format!(
+            "the start is off the constraints by the distance {distance:e}: constraint {constraint} has the value \
+             {value:e}; give a start on the constraints, or request its projection with `project`"
+        ),
+        ConstraintError::RankDeficient { rank, expected, .. } => format!(
+            "the constraints are dependent at the start: {rank} of {expected} are independent, and constraint \
+             {constraint} follows from the others there or does not depend on the position; remove it, or start at \
+             another position"
+        ),
         error => error.to_string(),
     }
 }

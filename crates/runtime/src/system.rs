@@ -105,7 +105,7 @@ impl System {
     /// # Errors
     /// [`RuntimeError`] for invalid input.
     pub fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
-        self.kernel.plan(motion)
+        self.kernel.plan(motion).map_err(|error| error.with_constraint_of(self.formula()))
     }
 
     /// Runs a motion. A failure during the run is reported in the status of the outcome.
@@ -113,7 +113,7 @@ impl System {
     /// # Errors
     /// Those of [`plan`](Self::plan).
     pub fn run(&self, motion: &Motion, monitor: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
-        self.kernel.run(motion, monitor, None)
+        self.kernel.run(motion, monitor, None).map_err(|error| error.with_constraint_of(self.formula()))
     }
 
     /// Continues an interrupted motion; the result is bitwise that of an uninterrupted run. Events and rows from there
@@ -128,7 +128,7 @@ impl System {
         from: ResumeState,
         monitor: &mut dyn RunMonitor,
     ) -> Result<Outcome, RuntimeError> {
-        self.kernel.run(motion, monitor, Some(from))
+        self.kernel.run(motion, monitor, Some(from)).map_err(|error| error.with_constraint_of(self.formula()))
     }
 
     /// Runs a motion and keeps its rows.
@@ -171,7 +171,7 @@ impl System {
     /// # Errors
     /// Those of [`plan`](Self::plan).
     pub fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
-        self.kernel.check(motion, samples)
+        self.kernel.check(motion, samples).map_err(|error| error.with_constraint_of(self.formula()))
     }
 
     /// Runs an ensemble. A member that cannot start, or that fails, is passed on with the cause, and the others

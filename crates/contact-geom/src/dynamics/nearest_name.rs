@@ -1,15 +1,20 @@
 //! Names that were probably meant.
 
 /// The name that is nearest to a given one, if it is close enough to be intended: at most three characters differ, and
-/// at most a third of them.
+/// at most a third of them. A single letter is near to itself in the other case only.
 ///
 /// ```
 /// assert_eq!(contact_geom::support::nearest_name("keplr", ["pendulum", "kepler"]), Some("kepler"));
 /// assert_eq!(contact_geom::support::nearest_name("lattice", ["pendulum", "kepler"]), None);
+/// assert_eq!(contact_geom::support::nearest_name("k", ["x", "K"]), Some("K"));
+/// assert_eq!(contact_geom::support::nearest_name("k", ["x"]), None);
 /// ```
 pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let near = known.into_iter().map(|other| (distance(name, other), other)).min_by_key(|(distance, _)| *distance);
-    let limit = name.chars().count().div_ceil(3).min(3);
+    let limit = match name.chars().count() {
+        0 | 1 => 0,
+        count => count.div_ceil(3).min(3),
+    };
     near.filter(|(distance, _)| *distance <= limit).map(|(_, other)| other)
 }
 

@@ -124,9 +124,10 @@ where
         PhasePoint { q: x.q, p: x.v, z: x.z }.check()?;
         let substeps = substeps(scheme)?;
         let omega = distribution.omega(&x.q);
-        let rank = independent_rows(&omega).iter().filter(|kept| **kept).count();
-        if rank < M {
-            return Err(ConstraintError::RankDeficient { rank, expected: M }.into());
+        let kept = independent_rows(&omega);
+        if let Some(index) = kept.iter().position(|kept| !kept) {
+            let rank = kept.iter().filter(|kept| **kept).count();
+            return Err(ConstraintError::RankDeficient { rank, expected: M, index }.into());
         }
         let inverse = inverse_mass(&lagrangian, start.t, &x)?;
         // As in `ConstrainedStart::resolved_for`.

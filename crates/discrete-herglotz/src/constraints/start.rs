@@ -115,7 +115,8 @@ impl<const N: usize> ConstrainedStart<N> {
         let kept = independent_rows(g);
         let rank = kept.iter().filter(|kept| **kept).count();
         if rank < count && (self.redundancy == Redundancy::Refuse || rank == 0) {
-            return Err(ConstraintError::RankDeficient { rank, expected: count }.into());
+            let index = kept.iter().position(|kept| !kept).unwrap_or(0);
+            return Err(ConstraintError::RankDeficient { rank, expected: count, index }.into());
         }
         Ok(kept)
     }

@@ -40,7 +40,7 @@ pub enum ConstraintError {
     /// The rows of `c_q`, or of omega, are dependent.
     #[error(
         "the constraints are dependent at the start: the matrix c_q (or omega) has the rank {rank}, but there are \
-         {expected} constraints; remove constraints that follow from others, start at another position, or request \
+         {expected} constraints, and the row of constraint {index} follows from the others; remove constraints that follow from others, start at another position, or request \
          multipliers of least norm with `Redundancy::LeastNorm` if the constraints are redundant everywhere"
     )]
     RankDeficient {
@@ -48,6 +48,8 @@ pub enum ConstraintError {
         rank: usize,
         /// The number of constraints.
         expected: usize,
+        /// A constraint whose row follows from those of the others, counted from 0.
+        index: usize,
     },
     /// The rank of `c_q` is smaller at the start than near it, or dependent constraints contradict each other.
     #[error(

@@ -176,12 +176,15 @@ pub struct Panel {
     pub curves: Vec<Curve>,
     /// Marked points of a solid curve: the states that it connects.
     pub marks: Vec<(f64, f64)>,
+    /// Whether a unit has the same length on both axes, so that circles are round; the axis with more room is extended.
+    pub equal_scales: bool,
 }
 
 impl Panel {
     /// A panel without marked points, by the quantity and the range of both axes.
     pub fn new((x_label, x): (&str, Axis), (y_label, y): (&str, Axis), legend: (f64, f64), curves: Vec<Curve>) -> Self {
-        Panel { x_label: x_label.into(), y_label: y_label.into(), x, y, legend, curves, marks: Vec::new() }
+        let (x_label, y_label) = (x_label.into(), y_label.into());
+        Panel { x_label, y_label, x, y, legend, curves, marks: Vec::new(), equal_scales: false }
     }
 }
 
@@ -241,7 +244,9 @@ impl Panel {
         } else {
             LegendPosition::DataCoords(corner.0, corner.1)
         };
-        Layout::auto_from_plots(plots)
+        let layout = Layout::auto_from_plots(plots);
+        let layout = if self.equal_scales { layout.with_equal_aspect() } else { layout };
+        layout
             .with_scale(SCALE)
             .with_label_size(11)
             .with_tick_size(10)

@@ -42,8 +42,14 @@ impl<'a> Parser<'a> {
         };
         match instead {
             Some(instead) => error.message = format!("{}; {instead}", error.message),
+            None if is_function => {
+                error.nearest = self.names.nearest_function(name);
+                if error.nearest.is_none() {
+                    error.message = format!("{}; {}", error.message, self.names.functions_like(name));
+                }
+            }
             None => {
-                let has_velocities = !is_function && !self.names.are_of_hamiltonian();
+                let has_velocities = !self.names.are_of_hamiltonian();
                 let velocity = velocity_of(name, &self.names.blocks).filter(|_| has_velocities);
                 error.nearest = velocity.or_else(|| self.names.nearest(name, &locals));
             }

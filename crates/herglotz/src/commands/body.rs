@@ -2,9 +2,9 @@
 
 use super::checkpoint::{Checkpoint, CheckpointWriter};
 use super::run::{Run, read_numbers, steps};
-use super::run_writer::{Headers, ROWS, RunOutput, RunWriter};
+use super::run_writer::{EVENTS, Headers, ROWS, RunOutput, RunWriter};
 use crate::failure::Failure;
-use crate::output::{Directory, exact, json, print, print_json, short};
+use crate::output::{Directory, Written, exact, json, print, print_json, short};
 use crate::plot_body;
 use herglotz::BodyScene;
 use herglotz::runtime::{Body, BodyMotion, BodyOutcome, BodyResumeState, Crossing, GroupStatus, Plan, RuntimeError};
@@ -77,10 +77,15 @@ impl Run {
         writer.end_progress();
         let outcome = outcome.map_err(explain)?;
         let written = writer.finish(&directory, outcome.steps)?;
-        for (name, figure) in written.kept.iter().flat_map(|rows| plot_body::of_body(&scene.body, rows)) {
-            directory.write(name, &figure)?;
+        let mut files = Written::default();
+        files.push(directory.file(ROWS));
+        if !scene.events.is_empty() {
+            files.push(directory.file(EVENTS));
         }
-        self.tell_body(&scene, &plan, &outcome, &written)
+        for (name, figure) in written.kept.iter().flat_map(|rows| plot_body::of_body(&scene.body, rows)) {
+            files.push(directory.write(name, &figure)?);
+        }
+        self.tell_body(&scene, &plan, &outcome, (&written, &files))
     }
 
     /// Prints the final state.
@@ -89,7 +94,7 @@ impl Run {
         scene: &BodyScene,
         plan: &Plan,
         outcome: &BodyOutcome,
-        written: &RunOutput,
+        (written, files): (&RunOutput, &Written),
     ) -> Result<(), Failure> {
         let RunOutput { rows, events, is_resumable: interrupted, .. } = *written;
         let status = match outcome.status {
@@ -102,6 +107,12 @@ impl Run {
             }
             status => status.to_string(),
         };
+        if scene.body.gamma > 0.0 {
+            eprintln!(
+                "warning: gamma is {}, so that the motion gains energy: for a drag it is negative",
+                scene.body.gamma
+            );
+        }
         let end: Vec<(&str, f64)> = Body::COLUMNS.iter().copied().zip(outcome.row()).collect();
         if self.json {
             let end: serde_json::Map<_, _> = end.iter().map(|(name, x)| ((*name).to_owned(), json(*x))).collect();
@@ -113,6 +124,7 @@ impl Run {
                 "estimated_error": plan.error,
                 "rows": rows,
                 "events": events,
+                "files": files.paths(),
                 "end": end,
             }))?;
         } else {
@@ -123,6 +135,7 @@ impl Run {
                 format!("{rows} rows{crossings}; the final state:"),
             ];
             lines.extend(end.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));
+            lines.push(files.line());
             print(&lines.join("\n"))?;
         }
         match outcome.status {

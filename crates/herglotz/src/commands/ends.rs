@@ -3,7 +3,7 @@
 use super::run::Run;
 use super::run_writer::ROWS;
 use crate::failure::Failure;
-use crate::output::{Directory, Table, json, print, print_json, short};
+use crate::output::{Directory, Table, Written, json, print, print_json, short};
 use crate::plot;
 use herglotz::EndsScene;
 use herglotz::runtime::FoundPath;
@@ -25,16 +25,18 @@ impl Run {
         let mut table = Table::new(directory.file(ROWS), scene.columns.iter().map(|(name, _)| name.as_str()))?;
         rows.iter().try_for_each(|row| table.numbers(row))?;
         table.finish()?;
+        let mut files = Written::default();
+        files.push(directory.file(ROWS));
         if self.plot {
             for (name, figure) in plot::of_path(&scene, &rows) {
-                directory.write(&name, &figure)?;
+                files.push(directory.write(&name, &figure)?);
             }
         }
-        self.tell_path(&scene, &found)
+        self.tell_path(&scene, &found, &files)
     }
 
     /// Prints how the search ended, and the quality of the path.
-    fn tell_path(&self, scene: &EndsScene, found: &FoundPath) -> Result<(), Failure> {
+    fn tell_path(&self, scene: &EndsScene, found: &FoundPath, files: &Written) -> Result<(), Failure> {
         let FoundPath { residual, log_factor, regularity, iterations, .. } = found;
         let (by, steps) = (scene.problem.by, scene.problem.steps);
         let (t0, t1) = scene.problem.span;
@@ -60,6 +62,7 @@ impl Run {
                 "log_factor": json(*log_factor),
                 "action": json(found.action()),
                 "rows": steps + 1,
+                "files": files.paths(),
                 "start": start,
             }))?;
         } else {
@@ -87,6 +90,7 @@ impl Run {
                 short(found.action()),
                 short(*log_factor)
             ));
+            lines.push(files.line());
             print(&lines.join("\n"))?;
         }
         if let Some(unresolved) = found.unresolved {

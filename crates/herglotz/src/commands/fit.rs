@@ -3,7 +3,7 @@
 use super::run_writer::interrupt_flag;
 use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
-use crate::output::{Directory, Table, exact, json, print, print_json, short, table};
+use crate::output::{Directory, Table, Written, exact, json, print, print_json, short, table};
 use crate::plot_fit;
 use clap::Args;
 use herglotz::Scene;
@@ -60,15 +60,17 @@ impl Fit {
         directory.create()?;
         write_unknowns(&fitted, &directory)?;
         write_residuals(&fitted, &directory)?;
+        let mut files = Written::default();
+        ["fit.csv", "residuals.csv"].into_iter().for_each(|name| files.push(directory.file(name)));
         if self.plot {
             let rows = drawn_rows(&scene, &fitted).map_err(explain)?;
-            directory.write("fit.svg", &plot_fit::of_fit(&fitted, &rows))?;
-            directory.write("residuals.svg", &plot_fit::of_residuals(&fitted))?;
+            files.push(directory.write("fit.svg", &plot_fit::of_fit(&fitted, &rows))?);
+            files.push(directory.write("residuals.svg", &plot_fit::of_residuals(&fitted))?);
         }
         if self.json {
             print_json(&of_json(&fitted))?
         } else {
-            print(&summary(&fitted))?
+            print(&format!("{}\n{}", summary(&fitted), files.line()))?
         }
         let status = &fitted.fit.status;
         if status.is_converged() { Ok(()) } else { Err(Failure::Run(status.to_string())) }
@@ -180,13 +182,12 @@ fn summary(fitted: &FittedMotion) -> String {
         rows.push([name.clone(), short(fit.parameters[i]), error].into_iter().chain(of_others).collect());
     }
     let mut lines = vec![fit.status.to_string(), table(&rows)];
-    let deviation = fit.residual_variance.map(|s| format!(", their standard deviation {:.3e}", s.sqrt()));
     lines.push(format!(
-        "{} values, {} degrees of freedom; the norm of the residuals is {:.3e}{}",
+        "{} values, {} degrees of freedom; the norm of the residuals is {:.3e}; {}",
         fit.residuals.len(),
         fit.degrees_of_freedom,
         fit.residuals.norm(),
-        deviation.unwrap_or_default()
+        fit.of_errors()
     ));
     lines.push(format!("{} iterations, {} evaluations", fit.iterations, fit.evaluations));
     if let Some(defect) = fitted.largest_defect {

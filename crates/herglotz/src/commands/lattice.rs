@@ -1,9 +1,9 @@
 //! `herglotz run` for a lattice.
 
 use super::run::Run;
-use super::run_writer::{Headers, RunWriter};
+use super::run_writer::{Headers, ROWS, RunWriter};
 use crate::failure::Failure;
-use crate::output::{Directory, json, print, print_json, short};
+use crate::output::{Directory, Written, json, print, print_json, short};
 use crate::plot;
 use herglotz::LatticeScene;
 use herglotz::runtime::{Outcome, Status};
@@ -25,14 +25,21 @@ impl Run {
         writer.end_progress();
         let outcome = outcome.map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let written = writer.finish(&directory, outcome.steps)?;
+        let mut files = Written::default();
+        files.push(directory.file(ROWS));
         for (name, figure) in written.kept.iter().flat_map(|rows| plot::of_lattice(&scene, rows)) {
-            directory.write(&name, &figure)?;
+            files.push(directory.write(&name, &figure)?);
         }
-        self.tell_lattice(&scene, &outcome, written.rows)
+        self.tell_lattice(&scene, &outcome, (written.rows, &files))
     }
 
     /// Prints the final state.
-    fn tell_lattice(&self, scene: &LatticeScene, outcome: &Outcome, rows: usize) -> Result<(), Failure> {
+    fn tell_lattice(
+        &self,
+        scene: &LatticeScene,
+        outcome: &Outcome,
+        (rows, files): (usize, &Written),
+    ) -> Result<(), Failure> {
         let interrupted = matches!(outcome.status, Status::Stopped { .. });
         let status = match outcome.status {
             _ if interrupted => "interrupted".to_owned(),
@@ -51,15 +58,17 @@ impl Run {
                 "evaluations": evaluations,
                 "rows": rows,
                 "sites": scene.sizes,
+                "files": files.paths(),
                 "end": { "t": json(*t), "z": json(z) },
             }))?;
         } else {
             let sites: usize = scene.sizes.iter().product();
             print(&format!(
                 "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the final state:\n  t = {}\n \
-                  z = {}",
+                  z = {}\n{}",
                 short(*t),
-                short(z)
+                short(z),
+                files.line()
             ))?;
         }
         match outcome.status {

@@ -5,6 +5,7 @@ mod body_sweep;
 mod check;
 mod checkpoint;
 mod compare;
+mod completions;
 mod ends;
 mod fit;
 mod lattice;
@@ -86,11 +87,7 @@ impl Command {
             Command::Fit(command) => command.run(),
             Command::List(command) => command.run(),
             Command::New(command) => command.run(),
-            Command::Completions { shell } => {
-                let mut text = Vec::new();
-                clap_complete::generate(shell, &mut Program::command(), "herglotz", &mut text);
-                print(&String::from_utf8_lossy(&text))
-            }
+            Command::Completions { shell } => print(&completions::text(shell, &Program::command())),
             Command::Schema => print_json(&herglotz::schema()),
         }
     }

@@ -4,7 +4,7 @@ use super::checkpoint::{Checkpoint, CheckpointWriter};
 use super::run_writer::{EVENTS, Headers, ROWS, RunWriter};
 use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
-use crate::output::{Directory, exact, json, print, print_json, read_rows, short};
+use crate::output::{Directory, Written, exact, json, print, print_json, read_rows, short};
 use crate::plot;
 use clap::Args;
 use herglotz::runtime::{
@@ -110,17 +110,22 @@ impl Run {
         for (count, (name, _)) in written.not_finite.iter().zip(&scene.columns).filter(|(count, _)| **count > 0) {
             eprintln!("warning: the column `{name}` is not a finite number in {count} rows");
         }
+        let mut files = Written::default();
+        files.push(directory.file(ROWS));
+        if !scene.events.is_empty() {
+            files.push(directory.file(EVENTS));
+        }
         if self.plot {
             for (name, figure) in plot::of_rows(&scene, &read_numbers(&directory.file(ROWS))?) {
-                directory.write(&name, &figure)?;
+                files.push(directory.write(&name, &figure)?);
             }
             if !scene.events.is_empty()
                 && let Some(figure) = plot::of_section(&scene, &read_crossings(&scene, &directory.file(EVENTS))?)
             {
-                directory.write("section.svg", &figure)?;
+                files.push(directory.write("section.svg", &figure)?);
             }
         }
-        self.report(&scene, &plan, &outcome, (written.rows, written.events), written.is_resumable)
+        self.report(&scene, &plan, &outcome, (written.rows, written.events, &files), written.is_resumable)
     }
 
     /// Prints the final state.
@@ -129,7 +134,7 @@ impl Run {
         scene: &Scene,
         plan: &Plan,
         outcome: &Outcome,
-        (rows, events): (usize, usize),
+        (rows, events, files): (usize, usize, &Written),
         interrupted: bool,
     ) -> Result<(), Failure> {
         let end = end_of(scene, outcome);
@@ -153,6 +158,7 @@ impl Run {
                 "estimated_error": plan.error.or(outcome.error_estimate.filter(|e| e.is_finite())),
                 "rows": rows,
                 "events": events,
+                "files": files.paths(),
                 "end": end,
             }))?;
         } else {
@@ -162,8 +168,14 @@ impl Run {
                 .or(outcome.error_estimate)
                 .map(|error| format!(", estimated error {error:.1e}"))
                 .unwrap_or_default();
+            let instead = match scene.motion().step_control {
+                StepControl::Steps { steps: Steps::Size(given), .. } if is_another(given, *step_size) => {
+                    format!(" (in place of {}, so that they fill the span)", short(given))
+                }
+                _ => String::new(),
+            };
             let mut lines = vec![format!(
-                "{status}: {steps} {} of {} by {}{error}",
+                "{status}: {steps} {} of {}{instead} by {}{error}",
                 if *steps == 1 { "step" } else { "steps" },
                 short(*step_size),
                 integrator.name
@@ -171,7 +183,11 @@ impl Run {
             let crossings = if scene.events.is_empty() { String::new() } else { format!(", {events} events") };
             lines.push(format!("{rows} rows{crossings}; the final state:"));
             lines.extend(end.iter().map(|(name, x)| format!("  {name} = {}", short(*x))));
+            lines.push(files.line());
             print(&lines.join("\n"))?;
+        }
+        if let Some(warning) = scene.gain_of_energy() {
+            eprintln!("warning: {warning}");
         }
         if let Some(unresolved) = outcome.unresolved {
             eprintln!("warning: {unresolved}");
@@ -190,6 +206,11 @@ impl Run {
             }
         }
     }
+}
+
+/// Whether a given step differs from one that was taken by more than round-off.
+fn is_another(given: f64, taken: f64) -> bool {
+    (taken.abs() / given.abs() - 1.0).abs() > 1e-9
 }
 
 /// A number of steps with the integrator of this name.

@@ -1,7 +1,7 @@
 //! The scene file of a command.
 
 use crate::failure::Failure;
-use clap::Args;
+use clap::{Args, ValueHint};
 use herglotz::{BodyScene, Scene, SceneError};
 use std::path::{Path, PathBuf};
 
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 pub(crate) struct SceneArguments {
     /// The scene file.
+    #[arg(value_hint = ValueHint::FilePath)]
     pub(crate) file: PathBuf,
     /// Override a value of the scene: a parameter, start.NAME, run.time, run.accuracy, run.step, run.steps or
     /// run.integrator; for a rigid body mass, gamma, inertia1, inertia=[1.0, 2.0, 3.0], start.omega1 and others.

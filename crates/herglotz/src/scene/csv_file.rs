@@ -27,6 +27,12 @@ impl<'a> CsvFile<'a> {
                 _ => format!("the file {file:?} cannot be read: {cause}"),
             })
         })?;
+        if let Some(separator) = other_separator(&contents) {
+            return Err(refuse(format!(
+                "the columns of the file {file:?} seem to be separated by {separator}; separate them by commas, and write \
+                 numbers with a decimal point"
+            )));
+        }
         let no_table = |cause: csv::Error| refuse(format!("the file {file:?} is no table: {cause}"));
         let mut reader =
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_bytes());
@@ -72,4 +78,20 @@ impl<'a> CsvFile<'a> {
         let message = format!("line {line} of the file {:?} has {entry:?} for `{column}`; {why}", self.name.as_str());
         SceneError::at(self.text, self.span(), message)
     }
+}
+
+/// The separator that a text seems to have in place of commas: one that the header and all rows have equally often, while
+/// the header has no comma.
+fn other_separator(contents: &str) -> Option<&'static str> {
+    let lines = || contents.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let header = lines().next()?;
+    if header.contains(',') {
+        return None;
+    }
+    [(';', "semicolons"), ('\t', "tabs"), ('|', "`|`"), (' ', "blanks")].into_iter().find_map(|(separator, name)| {
+        let count = |line: &str| line.matches(separator).count();
+        let found = count(header);
+        let is_one = separator != ' ' || lines().skip(1).all(|line| line.split_whitespace().count() == found + 1);
+        (found > 0 && is_one && lines().all(|line| separator == ' ' || count(line) == found)).then_some(name)
+    })
 }

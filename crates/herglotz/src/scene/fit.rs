@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::checked::{finite, positive};
 use super::csv_file::CsvFile;
-use super::fit_table::{Deviation, FitTable, LossName};
+use super::fit_table::{Deviation, FitTable, LossName, Observed};
 use super::location::{Location, Span};
 use super::output::times_in_order;
 use super::sweep::{Purpose, slot};
@@ -23,6 +23,7 @@ pub(super) struct SceneFit {
     unknowns: Vec<Unknown>,
     series: Vec<Series>,
     loss: ResidualLoss,
+    absolute_deviations: bool,
     nodes: Vec<f64>,
     starts: Vec<Vec<f64>>,
     max_evaluations: Option<usize>,
@@ -69,6 +70,7 @@ impl Reader<'_> {
             series: self.series(table)?,
             unknowns,
             loss: self.loss(table)?,
+            absolute_deviations: table.absolute_sigma,
             nodes: self.nodes(table)?,
             starts,
             max_evaluations: evaluations.map(|count| **count),
@@ -209,16 +211,25 @@ impl Reader<'_> {
             Deviation::Number(_) => None,
         });
         let deviation_columns: Vec<&str> = deviation_columns.collect();
-        let by_default = || {
-            let shown = file.columns().filter(|column| *column != time && !deviation_columns.contains(column));
-            shown.map(|column| Location::new(column.to_owned(), file.span())).collect::<Vec<_>>()
+        // Each quantity with its column.
+        let observed: Vec<(Location<String>, Location<String>)> = match table.observe.as_deref() {
+            None => {
+                let shown = file.columns().filter(|column| *column != time && !deviation_columns.contains(column));
+                shown.map(|column| Location::new(column.to_owned(), file.span())).map(|of| (of.clone(), of)).collect()
+            }
+            Some(Observed::Columns(list)) => {
+                let column = |of: &Location<String>| Location::new(column_of(of).to_owned(), of.span());
+                list.iter().map(|of| (of.clone(), column(of))).collect()
+            }
+            Some(Observed::Quantities(table)) => {
+                table.0.iter().map(|(column, of)| (of.clone(), column.clone())).collect()
+            }
         };
-        let observed = table.observe.as_ref().map_or_else(by_default, |list| list.to_vec());
         if observed.is_empty() {
             let message = "nothing is observed; name at least one column, as in observe = [\"x\"]";
             return Err(SceneError::at(text, table.observe.as_ref().map_or(file.span(), Location::span), message));
         }
-        let columns: Vec<&str> = observed.iter().map(|quantity| column_of(quantity)).collect();
+        let columns: Vec<&str> = observed.iter().map(|(_, column)| column.as_str()).collect();
         for (name, sigma) in &table.sigma.0 {
             if !columns.contains(&name.as_str()) {
                 let message = format!("`{}` is not observed; the observed columns are {}", **name, columns.join(", "));
@@ -229,9 +240,9 @@ impl Reader<'_> {
             }
         }
         let mut all = Vec::with_capacity(observed.len());
-        for (quantity, column) in observed.iter().zip(columns) {
+        for ((quantity, column_at), column) in observed.iter().zip(columns) {
             self.check_quantity(quantity, table.observe.is_none())?;
-            let place = file.place(column, quantity.span(), "observe")?;
+            let place = file.place(column, column_at.span(), "observe")?;
             let deviation = table.sigma.get(column);
             let mut series = Series { quantity: (**quantity).clone(), times: vec![], values: vec![], deviations: None };
             let mut deviations = Vec::new();
@@ -275,6 +286,16 @@ impl Reader<'_> {
             }
             series.deviations = deviation.is_some().then_some(deviations);
             all.push(series);
+        }
+        if table.absolute_sigma
+            && let Some(series) = all.iter().find(|series| series.deviations.is_none())
+        {
+            let message = format!("`absolute_sigma` is given, but `sigma` has no `{}`; add it", series.quantity);
+            return Err(SceneError::at(
+                text,
+                table.sigma.0.first().map_or(table.csv.span(), |(name, _)| name.span()),
+                message,
+            ));
         }
         if all.iter().all(|series| series.times.iter().all(|t| *t <= self.start.t)) {
             let message = format!(
@@ -326,6 +347,7 @@ impl SceneFit {
     pub fn of(&self, motion: crate::runtime::Motion) -> MotionFit {
         MotionFit {
             loss: self.loss,
+            absolute_deviations: self.absolute_deviations,
             nodes: self.nodes.clone(),
             starts: self.starts.clone(),
             max_evaluations: self.max_evaluations,

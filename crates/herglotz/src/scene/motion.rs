@@ -144,6 +144,7 @@ impl Scene {
         let (formula, resets) = with_resets(text, formula, &file.want.events)?;
         let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
         check_used(text, &formula, system, &texts)?;
+        tables::check_used(text, &tables, || all_formulas(&file))?;
         let source = system.lagrangian.as_ref().or(system.hamiltonian.as_ref());
         let lagrangian = source.map_or(system.span(), Location::span);
         let runs = System::new(&formula).map_err(|error| output::of_formula(text, lagrangian, &error))?;
@@ -311,6 +312,19 @@ impl Scene {
         )
     }
 
+    /// A warning where the parameter gamma is positive, and so is L_z, or -H_z, at the start: most who give it want a drag.
+    pub fn gain_of_energy(&self) -> Option<String> {
+        let (_, gamma) = self.system.formula().parameters().find(|(name, gamma)| *name == "gamma" && *gamma > 0.0)?;
+        let rate = if self.system.formula().is_hamiltonian() {
+            self.system.hamiltonian_geometry(&self.start).ok()?.rate
+        } else {
+            self.system.geometry(&self.start).ok()?.rate
+        };
+        let message =
+            "so that the motion gains energy: for a drag the rate is negative, as in gamma = -0.1 beside gamma*z";
+        (rate > 0.0).then(|| format!("gamma is {gamma} and L_z, or -H_z, is {rate} at the start, {message}"))
+    }
+
     /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
         use InputError as E;
@@ -323,7 +337,9 @@ impl Scene {
             | RuntimeError::WithConstraints { .. }
             | RuntimeError::OfFewCoordinates { .. }
             | RuntimeError::OfLagrangians { .. } => spans.lagrangian,
-            RuntimeError::HamiltonianUndefined | RuntimeError::Input(E::NoMomentum) => spans.start,
+            RuntimeError::HamiltonianUndefined
+            | RuntimeError::Constraint { .. }
+            | RuntimeError::Input(E::NoMomentum) => spans.start,
             RuntimeError::Input(error) => match error {
                 E::Step { .. } | E::NoSteps | E::TooMany { .. } | E::Count { .. } => spans.step,
                 E::Span { .. } => spans.time,
@@ -383,6 +399,20 @@ fn expressions(file: &File) -> impl Iterator<Item = &String> {
     let columns = file.want.rows.iter().filter_map(|rows| rows.columns.as_ref()).flat_map(|columns| columns.iter());
     let events = file.want.events.iter().flat_map(|event| [&event.when].into_iter().chain(&event.columns));
     columns.chain(events).map(|text| &**text)
+}
+
+/// The values of a table of formulas.
+fn values(table: &Option<Location<Named<String>>>) -> impl Iterator<Item = &str> {
+    table.iter().flat_map(|table| &table.0).map(|(_, value)| value.as_str())
+}
+
+/// All formulas of a scene in which a table can be.
+fn all_formulas(file: &File) -> Vec<&str> {
+    let system = file.system.lagrangian.iter().chain(&file.system.hamiltonian).map(|text| text.as_str());
+    let resets = file.want.events.iter().flat_map(|event| [&event.then, &event.rest]).flat_map(values);
+    let fit = file.fit.iter().flat_map(|fit| fit.formulas());
+    let others = expressions(file).map(String::as_str);
+    system.chain(values(&file.force)).chain(others).chain(resets).chain(fit).collect()
 }
 
 /// Forces, constraints, tables, breaks and resets in one text.

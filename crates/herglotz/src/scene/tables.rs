@@ -69,6 +69,30 @@ fn columns(
     Ok((numbers(time, TIME, "time")?, numbers(value, name, "value")?))
 }
 
+/// Refuses a table whose name occurs in none of these formulas.
+pub(super) fn check_used<'f>(
+    text: &str,
+    tables: &[(Location<String>, Table)],
+    formulas: impl Fn() -> Vec<&'f str>,
+) -> Result<(), SceneError> {
+    let is_used = |name: &str| formulas().iter().any(|formula| words(formula).any(|word| word == name));
+    match tables.iter().find(|(name, _)| !is_used(name)) {
+        None => Ok(()),
+        Some((name, _)) => {
+            let name_of = &**name;
+            let message = format!(
+                "the table `{name_of}` is used in no formula; write `{name_of}(t)` where it acts, or remove the table"
+            );
+            Err(SceneError::at(text, name.span(), message))
+        }
+    }
+}
+
+/// The identifiers in a formula.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !(c.is_alphanumeric() || c == '_'))
+}
+
 /// A number that tells tables apart: the FNV-1a hash of their samples.
 pub(super) fn fingerprint(tables: &[(Location<String>, Table)]) -> String {
     let of = |(name, table): &(Location<String>, Table)| {

@@ -65,6 +65,49 @@ fn exact_data_are_fitted_to_the_accuracy_of_the_motion() {
     assert!(column(&residuals, "residual").iter().all(|r| r.abs() < 1e-12), "{residuals}");
 }
 
+/// The standard error of the first unknown.
+fn error_of(report: &str) -> f64 {
+    let report: serde_json::Value = serde_json::from_str(report).unwrap();
+    report["unknowns"][0]["standard_error"].as_f64().unwrap()
+}
+
+/// A column whose name is no identifier is fitted by its quantity, and standard errors are scaled by the residuals unless the
+/// deviations are absolute.
+#[test]
+fn columns_of_any_name_and_absolute_deviations() {
+    let at = Directory::new("fit_columns");
+    at.write("data.csv", &data(0.01).replace("t,x", "t,Angle (rad)"));
+    let with = |sigma: f64, more: &str| {
+        let options =
+            format!("observe = {{ \"Angle (rad)\" = \"x\" }}\nsigma = {{ \"Angle (rad)\" = {sigma:?} }}\n{more}");
+        let file = at.write("scene.toml", &format!("{SPRING}{options}"));
+        succeed(&["fit", &file, "--out", &at.path("out"), "--json"])
+    };
+    let known = "absolute_sigma = true\n";
+    let ratio = |more: &str| error_of(&with(0.02, more)) / error_of(&with(0.01, more));
+    assert!((ratio("") - 1.0).abs() < 1e-6 && (ratio(known) - 2.0).abs() < 1e-6);
+    let file = at.path("scene.toml");
+    let said = succeed(&["fit", &file, "--out", &at.path("out")]);
+    assert!(said.contains("standard errors are those of the given deviations"), "{said}");
+    assert!(said.contains("written: ") && said.contains("fit.csv, ") && said.ends_with("residuals.csv\n"), "{said}");
+    with(0.01, "");
+    let said = succeed(&["fit", &file, "--out", &at.path("out")]);
+    assert!(said.contains("standard errors are scaled by the residuals"), "{said}");
+}
+
+/// A file with another separator than commas is refused with it.
+#[test]
+fn another_separator_is_named() {
+    let at = Directory::new("fit_separator");
+    let file = at.write("scene.toml", SPRING);
+    for (separator, name) in [(";", "semicolons"), ("\t", "tabs"), ("|", "`|`"), (" ", "blanks")] {
+        at.write("data.csv", &data(0.0).replace(',', separator));
+        let (code, said) = fail(&["fit", &file, "--out", &at.path("out")]);
+        assert_eq!(code, Some(2));
+        assert!(said.contains(&format!("seem to be separated by {name}; separate them by commas")), "{said}");
+    }
+}
+
 /// Everything that a scene can say of a fit, on data with errors.
 #[test]
 fn velocities_deviations_bounds_losses_starts_and_pieces() {
@@ -220,7 +263,7 @@ fn invalid_fits_are_refused_with_their_place() {
             "sigma.csv\"\nsigma = { x = \"s\" }",
             "line 13, column 7: line 3 of the file \"sigma.csv\" has \"-1\" for `s`; a standard deviation must be positive",
         ),
-        ("observe = [\"x\"]", "observe = [\"y\"]", "line 14, column 13: unknown name `y`; did you mean `x`?"),
+        ("observe = [\"x\"]", "observe = [\"y\"]", "line 14, column 13: unknown name `y`"),
         ("observe = [\"x\"]", "observe = [\"t\"]", "line 14, column 12: the column `t` is the time"),
         (
             "observe = [\"x\"]",
@@ -262,7 +305,38 @@ fn invalid_fits_are_refused_with_their_place() {
         (
             "observe",
             "loss = { hubert = 1.0 }\nobserve",
-            "line 14, column 10: unknown word `hubert`, expected one of `huber`, `soft_l1`, `cauchy`; did you mean `huber`?",
+            "line 14, column 8: unknown word `hubert`, expected one of `huber`, `soft_l1`, `cauchy`; did you mean `huber`?",
+        ),
+        (
+            "observe",
+            "loss = \"huber\"\nobserve",
+            "line 14, column 8: the loss \"huber\" has no scale, the residual at which outliers begin; write { huber = 2.0 }",
+        ),
+        (
+            "observe",
+            "loss = 2.0\nobserve",
+            "line 14, column 8: invalid type: number `2.0`, expected a loss with its scale, as in { huber = 2.0 }",
+        ),
+        (
+            "observe",
+            "loss = {}\nobserve",
+            "line 14, column 8: the loss is empty; give a loss with its scale, as in { huber = 2.0 }",
+        ),
+        (
+            "observe",
+            "absolute_sigma = true\nobserve",
+            "line 13, column 7: `absolute_sigma` is given, but `sigma` has no `x`; add it",
+        ),
+        (
+            "observe = [\"x\"]",
+            "observe = { \"Angle (rad)\" = \"x\" }",
+            "line 14, column 13: the file \"data.csv\" has no column `Angle (rad)`",
+        ),
+        ("observe = [\"x\"]", "observe = { x = \"y\" }", "line 14, column 18: unknown name `y`"),
+        (
+            "observe = [\"x\"]",
+            "observe = 1",
+            "line 14, column 11: invalid type: integer `1`, expected a list of columns, as in [\"x\"], or a table of quantities",
         ),
         ("observe", "nodes = [1.0, 50.0]\nobserve", "line 14, column 15: the time 50 is outside of the motion"),
         (

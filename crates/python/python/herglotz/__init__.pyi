@@ -194,6 +194,7 @@ class Sensitivity(NamedTuple):
     p: Vector
     z: Vector
     growth: float
+    t0: float
 
 class Gradient(NamedTuple):
     q0: Vector
@@ -647,6 +648,7 @@ def fit(
     t0: float | None = None,
     sigma: float | Mapping[str, ArrayLike] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    absolute_sigma: bool = False,
     loss: tuple[str, float] | None = None,
     nodes: ArrayLike = (),
     starts: Sequence[Mapping[str, float]] = (),

@@ -5,7 +5,7 @@ import numpy as np
 from . import _core
 from ._events import Event
 from ._solution import Interrupted
-from ._system import copied
+from ._system import copied, warn_of_positive
 
 # The columns of a row of the core, in their order.
 _PARTS = {
@@ -377,6 +377,7 @@ def _request(inertia, mass, centre, gravity, gamma, torque, attitude, omega, z0)
     """A body and its start as they are passed to the core."""
     if omega is None:
         raise ValueError("`omega` is not given: give the initial angular velocity in the body")
+    warn_of_positive(gamma)
     inertia = _array("inertia", inertia)
     if inertia.shape not in ((3,), (3, 3)):
         raise ValueError(f"`inertia` has the shape {inertia.shape}; it must be (3,) or (3, 3)")

@@ -177,6 +177,15 @@ def _warn(troubles):
         warnings.warn(f"motion {index} of the batch is not resolved: {trouble}", stacklevel=2)
 
 
+def check_shapes(parameters, z0):
+    """Refuses parameters and an action that are no single numbers."""
+    for name, x in (*((f"parameters[{name!r}]", x) for name, x in parameters.items()), ("z0", z0)):
+        # Traced values and tensors have a shape of their own.
+        shape = tuple(x.shape) if hasattr(x, "shape") else np.shape(x)
+        if shape:
+            raise ValueError(f"`{name}` has the shape {shape}; it must be a single number, of shape (): take an entry of it, such as x[0]")
+
+
 # Motions by their arguments: for a motion that is made anew in each iteration, JAX would compile its callback again.
 _KNOWN = {}
 _MOST = 128

@@ -9,7 +9,7 @@ from ._additions import breaks_of
 from ._events import events_of, has_reset, texts_of_events
 from ._solution import Interrupted, crossings
 from ._solve import columns_of, functions_of, system_and_start
-from ._system import check_used, copied, with_tables
+from ._system import check_used, copied, warn_of_gain, with_tables
 
 
 def ensemble(
@@ -131,8 +131,11 @@ def request_of(
     if parameters or tables:
         functions = (L, *functions_of(force, rayleigh))
         check_used(system, parameters, tables, functions, [*texts_of_events(given), *columns])
-    start = (copied(q0), copied(v0), False, copied(z0)) if p0 is None else (copied(q0), copied(p0), True, copied(z0))
+    if "gamma" in system.parameters and len(q0):
+        rate = v0 if p0 is None else p0
+        warn_of_gain(system, q0[0], rate[0] if np.ndim(rate) == 2 else None, values=parameters.get("gamma"))
     values = list(map(copied, varied.values()))
+    start = (copied(q0), copied(v0), False, copied(z0)) if p0 is None else (copied(q0), copied(p0), True, copied(z0))
     request = start, copied(t), (accuracy, integrator, step, steps), list(varied), values, threads, given
     return system, request, columns
 

@@ -19,7 +19,7 @@ class Fit:
     x : array of shape (m,)
         Their values.
     errors : array of shape (m,)
-        Their standard errors; NaN for those at bounds, and where the data do not determine the unknowns.
+        Their standard errors, scaled by the residuals unless `absolute_sigma` was given; NaN for those at bounds, and where the data do not determine the unknowns.
     at_bounds : dict
         "lower", "upper" or "fixed" for each unknown that is held there.
     covariance, correlation : array of shape (m, m), or None
@@ -116,6 +116,7 @@ def fit(
     t0=None,
     sigma=None,
     bounds=None,
+    absolute_sigma=False,
     loss=None,
     nodes=(),
     starts=(),
@@ -154,6 +155,9 @@ def fit(
         The time of the start; the first of `t` by default.
     sigma : float, or dict of floats or arrays, optional
         The standard deviations of all data, or of each quantity. Without it all data have the same weight.
+    absolute_sigma : bool
+        Standard errors are scaled by the size of the residuals, so that only the ratios of sigma matter, as by default in
+        `scipy.optimize.curve_fit`. With it they are those of the given sigma.
     bounds : dict of pairs, optional
         The lower and the upper bound of unknowns; equal for one that is held fixed.
     loss : tuple, optional
@@ -203,6 +207,8 @@ def fit(
     )  # fmt: skip
     series = [_series(name, values, times, sigma, data) for name, values in data.items()]
     bounded = _bounds(bounds, unknowns)
+    if absolute_sigma and any(deviations is None for *_, deviations in series):
+        raise ValueError("`absolute_sigma` is given without `sigma` of all data: give it, or remove `absolute_sigma`")
     if loss is not None:
         loss = _loss(loss)
     motion = _core.Motion(of, *request)
@@ -215,6 +221,7 @@ def fit(
         _vector("nodes", nodes).tolist(),
         [_values(given, unknowns, start) for given in starts],
         max_evaluations,
+        bool(absolute_sigma),
     )
     return Fit(of, list(data), record)
 

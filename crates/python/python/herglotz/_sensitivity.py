@@ -12,8 +12,10 @@ from ._solve import request_of, solve
 class Sensitivity(NamedTuple):
     """The derivatives of the k rows of a motion with respect to a variable, or to m of them; see `Solution.sensitivity`.
 
-    The times of the rows are fixed, except that of the final time where it is the variable. Round-off of the derivatives
-    is amplified by `growth`, the largest derivative along the motion divided by the largest one at its end, at least one.
+    The times of the rows are fixed, except that of the final time where it is the variable. Derivatives in the start are
+    those in the state at `t0`, where this motion starts: a motion from `Solution.resume` starts at the end of the one
+    before. Round-off of the derivatives is amplified by `growth`, the largest derivative along the motion divided by the
+    largest one at its end, at least one.
     """
 
     q: np.ndarray  # (k, n) or (k, n, m)
@@ -21,6 +23,7 @@ class Sensitivity(NamedTuple):
     p: np.ndarray  # (k, n) or (k, n, m)
     z: np.ndarray  # (k,) or (k, m)
     growth: float
+    t0: float
 
 
 class Gradient(NamedTuple):
@@ -86,7 +89,13 @@ def sensitivity(sol, variables):
     z = z.reshape(shape[:2])
     if is_one:
         q, v, p, z = q[:, :, 0], v[:, :, 0], p[:, :, 0], z[:, 0]
-    return Sensitivity(q, v, p, z, growth)
+    return Sensitivity(q, v, p, z, growth, start_time(sol._request))
+
+
+def start_time(request):
+    """The time of the start of a request."""
+    t = np.atleast_1d(np.asarray(request[1], dtype=float))
+    return float(t[0]) if np.ndim(request[1]) else 0.0
 
 
 def pullback(sol, q=None, v=None, p=None, z=None):

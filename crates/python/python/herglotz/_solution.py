@@ -180,7 +180,8 @@ class Solution:
         Returns
         -------
         Solution
-            The motion from the end of this one.
+            The motion from the end of this one, which is its start: its derivatives in the start are those in the state there,
+            with the momenta ``"p_x"`` in place of the velocities.
         """
         from ._solve import run
 

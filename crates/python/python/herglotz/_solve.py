@@ -1,10 +1,12 @@
 """One motion: its request and its run."""
 
+import numpy as np
+
 from . import _core
 from ._additions import breaks_of
 from ._events import events_of, texts_of_events
 from ._solution import Interrupted, Solution
-from ._system import check_used, copied, expression, system_of, with_tables
+from ._system import check_used, copied, expression, system_of, warn_of_gain, with_tables
 
 
 def solve(
@@ -173,6 +175,8 @@ def request_of(
     )
     if parameters or tables:
         check_used(L, parameters, tables, given, [*texts_of_events(given_events), *columns, *also])
+    if "gamma" in L.parameters:
+        warn_of_gain(L, q0, v0 if p0 is None or not L.kind[0] else p0, z0, t[0] if np.ndim(t) and np.size(t) else 0.0)
     event_names = tuple(events) if isinstance(events, dict) else len(request[4])
     return L, request, event_names, tuple(observe) if observe else ()
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import _core
 from ._solution import Interrupted
-from ._system import copied
+from ._system import copied, warn_of_gain, warn_of_positive
 
 
 class SparseSolution:
@@ -185,6 +185,12 @@ def lattice(
     (101, 1000)
     """
     coordinates = [coordinates] if isinstance(coordinates, str) else list(coordinates)
+    for name, of, example in (("site", site, "x'^2/2 - (1 - cos(x)) + gamma*z"), ("bond", bond, "-k*(xr - xl)^2/2")):
+        if not isinstance(of, str) and (name == "site" or of is not None):
+            raise TypeError(
+                f"`{name}` is {of!r}; a lattice is written by formulas, as in {name}=\"{example}\", and takes no functions: "
+                "functions are for `solve`"
+            )
     q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
     sizes = q0.shape
     if len(coordinates) > 1:
@@ -193,7 +199,10 @@ def lattice(
         sizes = sizes[:-1]
     parameters = dict(parameters) if parameters else None
     run = functools.partial(_run_lattice, (coordinates, site, bond), sizes, boundary, parameters)
-    return _solution(run, request, q0.shape, False)
+    found = _solution(run, request, q0.shape, False)
+    if parameters and "gamma" in parameters:
+        warn_of_gain(_core.System(site, coordinates, parameters), np.zeros(len(coordinates)))
+    return found
 
 
 def bodies(
@@ -256,6 +265,7 @@ def bodies(
     """
     q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
     masses = _array("masses", masses)
+    warn_of_positive(gamma)
     if q0.ndim != 2 or len(q0) != len(masses):
         raise ValueError(f"`q0` has the shape {q0.shape}; it must have a row for each of the {len(masses)} bodies")
     run = functools.partial(_run_bodies, masses, q0.shape[1], G, gamma)

@@ -2,6 +2,8 @@
 
 import difflib
 import re
+import sys
+import warnings
 from types import FunctionType
 
 import numpy as np
@@ -209,6 +211,42 @@ def _check_parameters(system, given, functions, expressions):
         near = difflib.get_close_matches(str(name), names, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"the formulas use {', '.join(map(repr, names)) or 'no parameters'}"
         raise ValueError(f"the parameter {name!r} is not used in the Lagrangian, a force, an event or a column: {hint}")
+
+
+_GAIN = "so that the motion gains energy: for a drag the rate is negative, as in gamma=-0.1 beside gamma*z"
+
+
+def warn_of_positive(gamma):
+    """Warns of a positive rate, which most who give it want to be a drag."""
+    if isinstance(gamma, (int, float)) and gamma > 0:
+        warnings.warn(f"gamma is {gamma}, {_GAIN}", stacklevel=_level())
+
+
+def warn_of_gain(of, q, rate=None, z=0.0, t=0.0, values=None):
+    """Warns of a system whose parameter gamma is positive and makes L_z, or -H_z, positive at a point."""
+    gamma = of.parameters.get("gamma") if values is None else np.max(values)
+    if gamma is None or not gamma > 0:
+        return
+    if values is not None:
+        of = of.with_parameters({"gamma": float(gamma)})
+    rate = np.zeros(np.size(q)) if rate is None else rate
+    try:
+        at = float(t), np.ravel(q), np.ravel(rate), float(z)
+        found = (_core.hamiltonian_geometry if of.kind[0] else _core.geometry)(of, at)["rate"]
+    except (TypeError, ValueError):
+        # What is wrong with the arguments is said elsewhere, and without a geometry there is no rate.
+        return
+    if found > 0:
+        name = "-H_z" if of.kind[0] else "L_z"
+        warnings.warn(f"gamma is {gamma:g} and {name} is {found:g} at the start, {_GAIN}", stacklevel=_level())
+
+
+def _level():
+    """The level of the stack of the first caller outside of the package."""
+    level, frame = 1, sys._getframe(1)
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "herglotz":
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def copied(x):

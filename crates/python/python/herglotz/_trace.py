@@ -257,14 +257,45 @@ def call_traced(function, names):
     """The value of a function (t, q, v, z, **parameters) of symbols."""
     coordinates, _, parameters = names[:3]
     t, q, v, z, values = symbols(len(coordinates), len(parameters))
-    return function(t, _vector(q), _vector(v), z, **_given(function, parameters, values, 4))
+    return _called(function, t, _vector(q), _vector(v), z, **_given(function, parameters, values, 4))
+
+
+# Packages whose functions take numbers of their own in place of symbols.
+_FOREIGN = {"jax": "jnp.cos", "torch": "torch.cos", "tensorflow": "tf.cos", "autograd": "autograd.numpy.cos", "cupy": "cupy.cos"}
+
+
+def _called(function, *given, **named):
+    """The value of a function of symbols; an error says where a function of a package that cannot take them is called."""
+    try:
+        return function(*given, **named)
+    except Exception as error:
+        package = _foreign_package(error)
+        if package is None:
+            raise
+        raise TypeError(
+            f"{name_of(function)} calls a function of {package}, which takes arrays of its own, but it is called once with "
+            f"symbols in place of numbers: write np.cos for {_FOREIGN[package]}, and so on; the formula is differentiated exactly"
+        ) from error
+
+
+def _foreign_package(error):
+    """The package in which an error was raised, if it is one of these."""
+    at, said = error.__traceback__, str(error)
+    while at is not None:
+        package = at.tb_frame.f_globals.get("__name__", "").partition(".")[0]
+        if package in _FOREIGN:
+            return package
+        at = at.tb_next
+    # JAX removes its frames from tracebacks, but names the type and its own functions.
+    is_ours = "herglotz.Symbol" in said or "herglotz._trace.Traced" in said
+    return next((package for package in _FOREIGN if is_ours and package in said), None)
 
 
 def call_of_positions(function, names):
     """The value of a function (q, **parameters) of symbols."""
     coordinates, _, parameters = names[:3]
     _, q, _, _, values = symbols(len(coordinates), len(parameters))
-    return function(_vector(q), **_given(function, parameters, values, 1))
+    return _called(function, _vector(q), **_given(function, parameters, values, 1))
 
 
 def _given(function, parameters, values, first):
@@ -296,7 +327,7 @@ def components_of(function, n, tables):
     """The formulas of the components of a map (q, p, z) -> (q, p, z), with v in place of p."""
     names = velocity_names([f"q[{n}]"])
     _, q, p, z, _ = symbols(n, 0)
-    found = function(_vector(q), _vector(p), z)
+    found = _called(function, _vector(q), _vector(p), z)
     if not isinstance(found, (tuple, list)) or len(found) != 3:
         raise ValueError(f"{name_of(function)} returns {found!r}; it must return a tuple (q, p, z)")
     found = list(np.ravel(np.array(found[0], dtype=object))), list(np.ravel(np.array(found[1], dtype=object))), found[2]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._differentiable import differentiable
+from ._differentiable import check_shapes, differentiable
 
 try:
     import jax
@@ -58,6 +58,7 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
         For an invalid argument. Where the motion is run by JAX, an exception of JAX with the same message.
     """
     parameters = dict(parameters or {})
+    check_shapes(parameters, z0)
     q0, v0, z0 = jnp.asarray(q0, dtype=float), jnp.asarray(v0, dtype=float), jnp.asarray(z0, dtype=float)
     of = differentiable(L, t, q0.shape[-1] if q0.ndim else 1, parameters, options)
     if q0.shape != (of.n,) or v0.shape != (of.n,):

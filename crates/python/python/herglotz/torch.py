@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ._differentiable import differentiable
+from ._differentiable import check_shapes, differentiable
 
 try:
     import torch
@@ -65,6 +65,7 @@ def solve(L, q0, v0, t, *, z0=0.0, parameters=None, **options):
     if "threads" in options:
         raise ValueError("`threads` cannot be given here: a motion is one computation; run several threads of your own")
     parameters = dict(parameters or {})
+    check_shapes(parameters, z0)
     of_double = lambda x: torch.as_tensor(x, dtype=torch.float64, device="cpu")
     q0, v0, z0 = of_double(q0), of_double(v0), of_double(z0)
     of = differentiable(L, t, q0.shape[-1] if q0.ndim else 1, parameters, options)

@@ -56,6 +56,8 @@ pub struct MotionFit {
     pub series: Vec<Series>,
     /// What a residual contributes to the cost.
     pub loss: Loss,
+    /// Whether the standard deviations are known in size: standard errors are then not scaled by that of the residuals.
+    pub absolute_deviations: bool,
     /// Times at which the motion is cut for multiple shooting; none without it.
     pub nodes: Vec<f64>,
     /// Other starts: values of all unknowns. Without any, the fit starts from the motion.
@@ -72,6 +74,7 @@ impl MotionFit {
             unknowns: unknowns.into(),
             series: series.into(),
             loss: Loss::Linear,
+            absolute_deviations: false,
             nodes: Vec::new(),
             starts: Vec::new(),
             max_evaluations: None,
@@ -110,6 +113,13 @@ impl System {
         if request.series.iter().any(|series| series.deviations.is_some()) {
             let of = |series: &Series| series.deviations.clone().unwrap_or_else(|| vec![1.0; series.values.len()]);
             problem = problem.standard_deviations(&request.series.iter().flat_map(of).collect::<Vec<_>>())?;
+        }
+        if request.absolute_deviations {
+            if let Some(series) = request.series.iter().find(|series| series.deviations.is_none()) {
+                let why = format!("are absolute, but `{}` has none; give them for all data", series.quantity);
+                return Err(RuntimeError::argument("deviations", why));
+            }
+            problem = problem.absolute_deviations(true);
         }
         for unknown in &request.unknowns {
             problem = problem.bounds(&unknown.name, unknown.lower, unknown.upper)?;

@@ -4,7 +4,8 @@ use super::formula_system::FormulaSystem;
 use super::recorder::Recorder;
 use super::sized::{Sized, coordinates};
 use crate::{Motion, Outcome, Plan, PlanEntry, RunMonitor, RuntimeError, StepControl};
-use discrete_herglotz::{Problem, ResumeState, Run, Until, Vector};
+use contact_geom::nalgebra::SVector;
+use discrete_herglotz::{Problem, ResumeState, Run, Steps, Until, Vector};
 use formula_lagrangian::Formula;
 
 /// What motions with a force lose, and why.
@@ -38,7 +39,10 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
         (StepControl::Steps { by, steps }, None) => problem.by(L::by(by)?).steps(steps),
     };
     let scales = motion.scales.as_ref().map(|scales| system.vector("scales", scales)).transpose()?;
-    Ok(requested(run, motion, scales.map(Vector::from)))
+    // Additional coordinates are at rest, and any size will do.
+    let n = system.0.formula().dimension();
+    let whole = |scales: SVector<f64, N>| Vector::from_fn(N, |i| if i < n { scales[i] } else { 1.0 });
+    Ok(requested(run, motion, scales.map(whole)))
 }
 
 /// A run with what a motion requests of it.
@@ -51,6 +55,9 @@ pub(super) fn requested<'p, 'o, P>(run: Run<'p, 'o, P>, motion: &Motion, scales:
         None => run,
     }
 }
+
+/// A given step that differs from that of the plan by less, relative to its size, is the same up to round-off.
+const ROUND_OFF_OF_STEPS: f64 = 1e-9;
 
 /// The first line of the plan of a formula in which z may have been meant to be a coordinate.
 const ACTION_IS_NO_COORDINATE: &str = "z is the action and acts as drag: it is no coordinate beside x and y; \
@@ -83,6 +90,14 @@ pub(super) fn plan_of<P>(
 ) -> Result<Plan, RuntimeError> {
     let plan = run.plan(Until::Time(motion.end))?;
     let (mut text, mut items) = (plan.to_string(), plan.entries());
+    if let StepControl::Steps { steps: Steps::Size(given), .. } = motion.step_control
+        && (plan.step_size().abs() / given.abs() - 1.0).abs() > ROUND_OFF_OF_STEPS
+    {
+        let (found, given) = (plan.step_size().abs(), given.abs());
+        let line = format!("the steps of {given} became {found}: equal steps that fill the span\n");
+        let first = text.find('\n').map_or(text.len(), |end| end + 1);
+        text.insert_str(first, &line);
+    }
     if acts_as_drag(formula) {
         text.insert_str(0, &format!("{ACTION_IS_NO_COORDINATE}\n"));
     }

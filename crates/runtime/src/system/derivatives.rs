@@ -1,8 +1,8 @@
 //! Derivatives of the motions of a system.
 
 use crate::{
-    EndCovector, Event, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
-    System, velocity_name,
+    EndCovector, Event, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError,
+    Sensitivity, System, velocity_name,
 };
 use discrete_herglotz::sensitivity::Variable;
 use formula_lagrangian::{Expression, ExpressionGradient, nearest_name};

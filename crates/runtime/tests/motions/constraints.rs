@@ -100,8 +100,12 @@ fn starts_off_the_constraints() {
     let off = Start::new(0.0, [1.0, 0.1], [0.5, 1.0], 0.0);
     let motion = Motion::new(off, 0.1, named("gauss_3", 10));
     let error = system.run(&motion, &mut ()).unwrap_err();
-    assert!(matches!(error, RuntimeError::Input(InputError::Constraint(_))), "{error:?}");
-    assert!(error.to_string().contains("off the constraints by the distance 4.97"), "{error}");
+    assert!(matches!(error, RuntimeError::Constraint { .. }), "{error:?}");
+    let said = error.to_string();
+    assert!(
+        said.contains("off the constraints by the distance 4.97") && said.contains("constraint \"x^2 + y^2 = "),
+        "{said}"
+    );
     let (outcome, rows) = system
         .record(&Motion {
             project: true,
