@@ -72,8 +72,8 @@ pub use error::{InputError, SelectionFailure, StepError};
 
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
-    DenseStep, INTERRUPTION, InitialState, Integrator, Interrupt, MethodInfo, Piece, PlanEntry, Problem, Reset,
-    RunSupport, SplittingScheme, Start, StepDetails, StepFailure, Stepper, StepperOptions, SystemProblem,
+    DenseStep, INTERRUPTION, InitialState, Integrator, Interrupt, MethodInfo, Piece, PieceStart, PlanEntry, Problem,
+    Reset, RunSupport, SplittingScheme, Start, StepDetails, StepFailure, Stepper, StepperOptions, SystemProblem,
 };
 pub use rules::integrator::CustomMethod;
 #[cfg(feature = "csv")]

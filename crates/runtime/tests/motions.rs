@@ -12,6 +12,8 @@ mod dimensions;
 mod ensembles;
 #[path = "motions/hamiltonians.rs"]
 mod hamiltonians;
+#[path = "motions/interrupted.rs"]
+mod interrupted;
 
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{AnyIntegrator, InputError, Problem, ResumeState, Status, Steps, Until};

@@ -345,10 +345,20 @@ pub enum StepError {
     /// Resets accumulate.
     #[error(
         "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or say \
-         how the motion continues there"
+         from which state, that is not pressed onto the surface, the motion continues"
     )]
     Accumulation {
         /// The limit of their times.
+        t: f64,
+    },
+    /// The motion rests on the surface of a reset, and is pressed onto it.
+    #[error(
+        "the motion rests at t = {t} on the surface of a reset, and is pressed onto it: contact that lasts is not \
+         computed; end the run before it, let the reset assign a state that leaves the surface or a coordinate that \
+         switches the force off, or replace the surface by a stiff force"
+    )]
+    Contact {
+        /// The time at which the contact begins.
         t: f64,
     },
     /// The Lagrangian jumps across a surface that depends on the velocity or on the action, or that the motion only
@@ -365,7 +375,7 @@ pub enum StepError {
     /// A coordinate or a derivative is infinite or NaN.
     #[error("a value is not finite: the motion leaves the domain of the Lagrangian, or grows without bound")]
     NonFinite,
-    /// The function of an event is not finite.
+    /// The function of an event or of a reset is not finite.
     #[error("the function of an event is not finite at t = {t}; use a function that is defined along the motion")]
     Event {
         /// The time.

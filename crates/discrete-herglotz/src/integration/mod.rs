@@ -40,7 +40,7 @@ pub(crate) use of_typed::OfTyped;
 pub use plan_entry::PlanEntry;
 pub use problem::{Problem, Start};
 pub(crate) use quantity_derivatives::QuantityDerivatives;
-pub use reset::{Piece, Reset};
+pub use reset::{Piece, PieceStart, Reset};
 pub use run_support::{RunSupport, SuspectInterval};
 pub use scheme::SplittingScheme;
 pub(crate) use solved_part::PartPoint;

@@ -34,7 +34,7 @@ pub trait StepDetails {
         &[]
     }
 
-    /// The pieces of the last step between its resets; empty for a step without resets.
+    /// The pieces of the last step, in their order; empty for a step that was not divided.
     fn pieces(&self) -> &[Piece] {
         &[]
     }

@@ -6,7 +6,9 @@ use crate::solve::chebyshev::{Samples, node};
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
 use crate::switching::local_motion::{LocalMotion, phase_point, rates_along_motion};
-use crate::{DenseStep, InputError, Point, State, System, Vector};
+use crate::system::AtSwitch;
+use crate::{DenseStep, InputError, Point, State, StepError, System, Vector};
+use contact_geom::numbers::max_or_nan;
 use std::convert::Infallible;
 
 /// The number of equal parts in which a curve without dense output is searched for jumps.
@@ -37,6 +39,14 @@ const POINT_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// The part of a step over which a motion on a surface is followed, forward and backward, to find the side to which it
 /// goes: the Taylor polynomial of the motion is exact enough, and changes are far above their round-off.
 const DEPARTURE: f64 = 1e-5;
+
+/// The largest distance of a sign change from the end of a step, in units of the round-off of the time, at which it may be
+/// on the end up to the round-off of the state.
+const END_SPACINGS: f64 = 1024.0;
+
+/// The part of the change by the second derivative, over [`DEPARTURE`], below which a rate is none: the motion would
+/// return to the surface within 1e-12 of a step.
+const MIN_RATE: f64 = 1e-7;
 
 /// The number of changes of a function, over [`DEPARTURE`] and by round-off, beyond which it is far from zero.
 const FAR: f64 = 64.0;
@@ -91,12 +101,17 @@ impl TimedState {
     }
 }
 
+/// Whether the state is replaced where a function crosses zero in this direction.
+fn has_reset(system: &dyn System, index: usize, (t, x): (f64, &Point), rising: bool) -> bool {
+    matches!(system.at_switch(index, t, x, rising), AtSwitch::Replace { .. })
+}
+
 /// The curve of a step: its collocation polynomial, or the cubic Hermite polynomial through both ends with their
 /// velocities.
 pub(super) struct StepCurve {
     pub from: TimedState,
     pub to: TimedState,
-    dense: Option<DenseStep>,
+    pub dense: Option<DenseStep>,
     /// For a system that is given by a contact Hamiltonian the derivatives of the momenta at both ends, where they are
     /// interpolated, and otherwise nothing.
     forces: Option<[Vector; 2]>,
@@ -196,7 +211,8 @@ pub(super) struct Surfaces {
 
 impl Surfaces {
     /// The sides of a point from which a motion starts with a time step h. A function that is zero up to round-off has
-    /// the sign that it takes next along the motion.
+    /// the sign that it takes next along the motion; if the motion has a reset there, in the direction of this change, it
+    /// has the other sign, so that the reset is the first thing that happens.
     pub fn at(system: &dyn System, t: f64, x: &Point, h: f64) -> Self {
         let mut values = Vec::new();
         system.switching_functions(t, x, &mut values);
@@ -206,12 +222,12 @@ impl Surfaces {
         surfaces
     }
 
-    /// The sides after a reset from one point to another at the surface `index`, which the motion leaves as given. The
-    /// motion stays on its side of every other surface on which the reset leaves it.
+    /// The sides after a reset from one point to another at the surface `index`, which the motion leaves to a given side.
+    /// The motion stays on its side of every other surface on which the reset leaves it.
     pub fn reset(
         &mut self,
         system: &dyn System,
-        (index, departure): (usize, Option<Departure>),
+        (index, departure): (usize, Option<f64>),
         t: f64,
         [from, to]: [&Point; 2],
         h: f64,
@@ -219,8 +235,9 @@ impl Surfaces {
         let old = self.clone();
         *self = Surfaces::at(system, t, to, h);
         for i in 0..self.sides.len() {
-            let side = if i == index { departure.map(|departure| departure.side) } else { None };
-            let stays = i != index && [from, to].into_iter().all(|x| self.is_on(system, i, (t, x), h));
+            let side = if i == index { departure } else { None };
+            let stays =
+                i != index && old.side(i) != 0.0 && [from, to].into_iter().all(|x| self.is_on(system, i, (t, x), h));
             if let Some(of) = self.sides.get_mut(i) {
                 *of = side.unwrap_or(if stays { old.side(i) } else { *of });
             }
@@ -285,11 +302,35 @@ impl Surfaces {
                 continue;
             }
             let tolerance = self.rounding(system, index, (t, x), h);
-            let departure = self.departure(system, index, (t, x), h, tolerance);
-            if let (Some(Departure { side, .. }), Some(of)) = (departure, self.sides.get_mut(index)) {
-                *of = side;
+            let Some(Departure { side, .. }) = self.departure(system, index, (t, x), h, tolerance) else { continue };
+            let resets =
+                self.is_on_without_motion(system, index, (t, x)) && has_reset(system, index, (t, x), side > 0.0);
+            if let Some(of) = self.sides.get_mut(index) {
+                *of = if resets { -side } else { side };
             }
         }
+    }
+
+    /// Whether a point is on a surface up to the round-off of its own numbers, whatever step it is reached by or the
+    /// motion goes on with: so a step leaves a reset at its end to the next one exactly if a motion that starts there
+    /// has the reset at its start.
+    pub fn is_on_without_motion(&mut self, system: &dyn System, index: usize, at: (f64, &Point)) -> bool {
+        self.is_on(system, index, at, 0.0)
+    }
+
+    /// Whether a sign change at the end of a step is a reset that is left to the start of the next step, or to the run
+    /// that continues this one.
+    pub fn is_left_to_next(
+        &mut self,
+        system: &dyn System,
+        curve: &StepCurve,
+        change: &SignChange,
+        spacing: f64,
+    ) -> bool {
+        let (to, index) = (&curve.to, change.index);
+        ((1.0 - change.estimate) * curve.span()).abs() <= END_SPACINGS * spacing
+            && self.is_on_without_motion(system, index, (to.t, &to.argument(system)))
+            && has_reset(system, index, (to.t, &to.argument(system)), self.side(index) < 0.0)
     }
 
     /// Whether a point is on a surface up to round-off.
@@ -333,10 +374,12 @@ impl Surfaces {
         let motion = LocalMotion::at(system, t, x);
         let mut after = |dt: f64| self.value(system, index, (t + dt, &motion.after(dt))) - here;
         let dt = DEPARTURE * h;
-        let (later, earlier) = (after(dt), after(-dt));
-        let (odd, even) = (0.5 * (later - earlier), 0.5 * (later + earlier));
+        let [(later, earlier), (near_later, near_earlier)] = [dt, 0.5 * dt].map(|dt| (after(dt), after(-dt)));
+        // The change by the rate, without that by the third derivative, and the change by the second derivative.
+        let odd = (8.0 * (near_later - near_earlier) - (later - earlier)) / 6.0;
+        let even = 0.5 * (later + earlier);
         let rounding = self.rounding(system, index, (t, x), dt);
-        match (odd.abs() > rounding, even.abs() > 0.0) {
+        match (odd.abs() > max_or_nan(rounding, MIN_RATE * even.abs()), even.abs() > 0.0) {
             (true, _) => Some(Departure { side: sign(odd), rate: odd / dt, with_rate: true }),
             (false, true) => Some(Departure { side: sign(even), rate: 0.0, with_rate: false }),
             (false, false) => None,
@@ -375,10 +418,36 @@ impl Surfaces {
 
     /// The first sign change along the curve of a step. A function without a side takes the sign of its first nonzero
     /// value.
-    pub fn first_change(&mut self, system: &dyn System, curve: &StepCurve) -> Option<SignChange> {
+    ///
+    /// # Errors
+    /// [`StepError::Event`] where the function of a reset is not defined on the curve, before any sign change.
+    pub fn first_change(&mut self, system: &dyn System, curve: &StepCurve) -> Result<Option<SignChange>, StepError> {
+        self.first_change_before(system, curve, None)
+    }
+
+    /// The first sign change along the curve of a part that ends on zeros: these are not among them.
+    ///
+    /// # Errors
+    /// Those of [`first_change`](Self::first_change).
+    pub fn earlier_change(
+        &mut self,
+        system: &dyn System,
+        curve: &StepCurve,
+        h: f64,
+    ) -> Result<Option<SignChange>, StepError> {
+        self.first_change_before(system, curve, Some(h))
+    }
+
+    /// With the length of a step, the surfaces on which the curve ends do not count at its end.
+    fn first_change_before(
+        &mut self,
+        system: &dyn System,
+        curve: &StepCurve,
+        ends_on_zeros: Option<f64>,
+    ) -> Result<Option<SignChange>, StepError> {
         let (count, degree) = (self.sides.len(), curve.sampling_degree());
         if count == 0 {
-            return None;
+            return Ok(None);
         }
         self.values.clear();
         for j in 0..=degree {
@@ -390,11 +459,25 @@ impl Surfaces {
         let samples_of =
             |index: usize| Samples::new(degree, |j| values.get(j * count + index).copied().unwrap_or(f64::NAN));
         let (mut first, mut without_side) = (None::<SignChange>, Vec::new());
+        let mut undefined: Option<f64> = None;
         for index in 0..count {
-            let samples = samples_of(index);
+            let mut samples = samples_of(index);
             let (side, end) = (self.side(index), sign(samples.ends()[1]));
             if side * end > 0.0 && has_no_zero(&samples, 0.0) {
                 continue;
+            }
+            if let Some(h) = ends_on_zeros
+                && self.is_on(system, index, (curve.to.t, &curve.to.argument(system)), h)
+            {
+                samples.set_end(0.0);
+            }
+            if let Some(j) = samples.values().iter().position(|value| value.is_nan())
+                && [true, false]
+                    .into_iter()
+                    .any(|rising| has_reset(system, index, (curve.from.t, &curve.from.argument(system)), rising))
+            {
+                let from = node(degree, j.saturating_sub(1));
+                undefined = Some(undefined.map_or(from, |other| other.min(from)));
             }
             let (place, ends) = self.change_of_side(system, curve, index, &samples);
             if let Some((own, from)) = place {
@@ -411,13 +494,18 @@ impl Surfaces {
         self.values = values;
         if let Some(change) = first {
             // A side that is taken only after the first sign change, the motion may never reach.
-            for (index, _) in without_side.into_iter().filter(|(_, from)| *from > change.ends[1]) {
+            for (index, _) in without_side.into_iter().filter(|(_, from)| *from > change.estimate) {
                 if let Some(slot) = self.sides.get_mut(index) {
                     *slot = 0.0;
                 }
             }
         }
-        first
+        match undefined {
+            Some(from) if first.is_none_or(|change| change.ends[0] >= from) => {
+                Err(StepError::Event { t: curve.from.t + from * curve.span() })
+            }
+            _ => Ok(first),
+        }
     }
 
     /// The side of a function with the fraction of the step from which it has one, and the fractions between which it
@@ -432,6 +520,9 @@ impl Surfaces {
         let size = samples.size();
         let (mut points, scale) = (Vec::new(), Scale { size, near: 0.0, noise: ROUND_OFF * size });
         let along = |fraction: f64| {
+            if fraction == 1.0 {
+                return samples.ends()[1];
+            }
             let (t, x) = curve.at(fraction);
             self.value(system, index, (t, &x))
         };

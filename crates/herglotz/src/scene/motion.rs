@@ -375,11 +375,10 @@ impl Scene {
     /// What is said of a step that fails where resets accumulate.
     pub fn accumulation(&self, cause: &StepError) -> Option<String> {
         let StepError::Accumulation { t } = cause else { return None };
-        let names = self.system.formula().coordinates();
-        let velocity = velocity_name(names.first().map_or("x", String::as_str));
         Some(format!(
             "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or \
-             add to the event the state from which the motion continues, as in rest = {{ \"{velocity}\" = \"0\" }}"
+             let `rest` of the event assign the state from which the motion continues: one that leaves the surface, or \
+             a coordinate that switches the force off, as in scenes/stick_slip.toml"
         ))
     }
 }

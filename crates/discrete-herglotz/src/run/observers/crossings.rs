@@ -1,5 +1,6 @@
 //! The sign changes of an event function within a step.
 
+use crate::integration::PieceStart;
 use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::observers::event_roots::RELATIVE_ROUND_OFF;
@@ -104,6 +105,11 @@ impl Event<'_> {
     ) -> Result<(), StepError> {
         let ((start, end), degree) = (step.ends(), interpolated.len() + 1);
         let value = self.value(end.0, &end.1);
+        if last_sign.departure.is_some_and(|departure| (departure.t - end.0) * (end.0 - start.0) > 0.0) {
+            // The function leaves its surface after this piece of a step.
+            last_sign.value = value;
+            return Ok(());
+        }
         let mut samples = Samples::new(degree, |j| match interpolated.get(j.wrapping_sub(1)) {
             Some(x) => self.value(step.time(node(degree, j)), x),
             None if j == 0 => last_sign.value,
@@ -112,7 +118,15 @@ impl Event<'_> {
         let size = samples.size();
         let near = MAX_NEAR_VALUE * size;
         // The end may be on the surface if the value is below a hundredth of its size in the step.
-        let departure = if value.abs() < near { self.departure_from(motion, end, value) } else { None };
+        let departure = match step.next() {
+            _ if value.abs() >= near => None,
+            Some((PieceStart::Reset, _)) => self.departure_without_reset(motion, end, value),
+            Some((_, next)) => {
+                let value = self.value(next.0, &next.1);
+                self.departure_from(motion, next, value)
+            }
+            None => self.departure_from(motion, end, value),
+        };
         // On the surface, the sign of the value is that of its round-off: a change to it does not count.
         let at_end = if departure.is_some() { 0.0 } else { value };
         samples.set_end(at_end);
@@ -156,6 +170,26 @@ impl Event<'_> {
         }
         last_sign.departure = departure;
         Ok(())
+    }
+
+    /// The sign change at a point where the state jumps, to a value of the function there, if it counts.
+    pub(crate) fn at_jump(
+        &mut self,
+        index: usize,
+        last_sign: &mut LastSign,
+        value: f64,
+        (t, state): &(f64, State),
+    ) -> Option<Crossing> {
+        if last_sign.departure.is_some() {
+            // It is on its surface, which it leaves to a known side.
+            last_sign.value = value;
+            return None;
+        }
+        match self.between(last_sign, [value, value], (*t, state)) {
+            Change::None => None,
+            Change::There(t, state) => Some(Crossing { t, event: index, state }),
+            Change::Between(_) => Some(Crossing { t: *t, event: index, state: state.clone() }),
+        }
     }
 
     /// Finds the sign changes between the points of a step; `false` if the interpolated states show one that the motion
@@ -286,20 +320,49 @@ impl Event<'_> {
     /// surface when its value exceeds twice this bound, so that its sign is not due to round-off.
     pub(crate) fn departure_from(
         &mut self,
+        motion: ScaledMotion<'_>,
+        from: &(f64, State),
+        g: f64,
+    ) -> Option<Departure> {
+        self.departure_along(motion.scales, from, g, |there| {
+            motion.motion.state_within_step(from, there, motion.near, None).ok().map(|(x, _)| x)
+        })
+    }
+
+    /// Where the function would leave its surface after a point at which a reset follows: along the line of the motion
+    /// that arrives there, so that an event on the surface of an impact is a sign change.
+    fn departure_without_reset(
+        &mut self,
         ScaledMotion { motion, scales, near }: ScaledMotion<'_>,
         from: &(f64, State),
         g: f64,
+    ) -> Option<Departure> {
+        let (t, state) = from;
+        let rates = motion.rates(*t, state, near).ok()?;
+        self.departure_along(scales, from, g, |there| {
+            let ahead = there - t;
+            Some(State { q: &state.q + &rates.q * ahead, p: &state.p + &rates.p * ahead, z: state.z + rates.z * ahead })
+        })
+    }
+
+    /// The same along a curve of states after the point.
+    fn departure_along(
+        &mut self,
+        scales: TimeScales,
+        from: &(f64, State),
+        g: f64,
+        curve: impl Fn(f64) -> Option<State>,
     ) -> Option<Departure> {
         let (t, state) = (from.0, &from.1);
         let (rounding, state_rounding) = (scales.rounding(t), self.rounding(t, state, g));
         let shortest = (f64::powi(2.0, -20) * scales.h.abs()).max(64.0 * rounding);
         for ahead in (0..5).map(|k| shortest * f64::powi(16.0, k)).take_while(|ahead| *ahead <= 0.5 * scales.h.abs()) {
-            let Some(departure) = self.after((motion, near), from, ahead.copysign(scales.h)) else { continue };
+            let Some(departure) = self.after(&curve, t + ahead.copysign(scales.h)) else { continue };
             let window = state_rounding + (departure.value - g).abs() * (rounding / ahead);
             let on = g.abs() <= window
                 // The function may jump across its surface.
                 || opposite_signs(g, departure.value)
-                    && self.after((motion, near), from, rounding.copysign(scales.h)).is_some_and(|x| opposite_signs(g, x.value));
+                    && self.after(&curve, t + rounding.copysign(scales.h)).is_some_and(|x| opposite_signs(g, x.value));
             if !on {
                 return None;
             }
@@ -310,16 +373,9 @@ impl Event<'_> {
         None
     }
 
-    /// The function on the motion at a time after a point; `None` if the motion or the function is not defined there.
-    fn after(
-        &mut self,
-        (motion, near): (&dyn Motion, NearbyVelocity<'_>),
-        from: &(f64, State),
-        ahead: f64,
-    ) -> Option<Departure> {
-        let there = from.0 + ahead;
-        let (x, _) = motion.state_within_step(from, there, near, None).ok()?;
-        let value = self.value(there, &x);
+    /// The function on a curve at a time; `None` if the curve or the function is not defined there.
+    fn after(&mut self, curve: &impl Fn(f64) -> Option<State>, there: f64) -> Option<Departure> {
+        let value = self.value(there, &curve(there)?);
         value.is_finite().then_some(Departure { t: there, value })
     }
 

@@ -1,5 +1,6 @@
 //! Events: sign changes of functions of the state along a run.
 
+use crate::integration::PieceStart;
 use crate::run::observers::crossings::{LastSign, ScaledMotion, TimeScales};
 use crate::run::observers::event::{Crossing, Event};
 use crate::run::{LastStep, Observer, OutputRequest, RunInfo, StepView, Stop, Terminal};
@@ -149,6 +150,24 @@ impl<'f> Events<'f> {
         ControlFlow::Continue(())
     }
 
+    /// Finds the sign changes where the momentum jumps, by which an event may pass its surface.
+    fn jump(&mut self, to: &(f64, State)) -> ControlFlow<Stop> {
+        self.rates = None;
+        let mut found = Vec::new();
+        for (index, (event, last_sign)) in self.events.iter_mut().zip(&mut self.last_signs).enumerate() {
+            match event.at(to.0, &to.1) {
+                Ok(value) => found.extend(event.at_jump(index, last_sign, value, to)),
+                Err(cause) => return ControlFlow::Break(Stop::failed(cause)),
+            }
+        }
+        let ends = found.iter().any(|crossing| self.events[crossing.event].terminal);
+        self.crossings.extend(found);
+        if ends {
+            return ControlFlow::Break(Stop { at: Some(to.clone()), ..Stop::here("an event") });
+        }
+        ControlFlow::Continue(())
+    }
+
     /// Finds the sign changes in a step, or in a piece of one.
     fn piece(&mut self, at: &StepView<'_>, step: &mut LastStep<'_>) -> ControlFlow<Stop> {
         let from = step.span().0;
@@ -211,11 +230,16 @@ impl Observer for Events<'_> {
         if at.stepper.pieces().is_empty() {
             return self.piece(at, &mut step);
         }
-        for (k, mut piece) in step.pieces().enumerate() {
-            if k > 0 {
-                self.start_at(at, piece.ends().0)?;
+        for (start, mut piece) in step.pieces() {
+            let (from, to) = piece.ends();
+            match start {
+                PieceStart::Regular | PieceStart::Zero => {}
+                PieceStart::Jump => self.jump(from)?,
+                PieceStart::Reset => self.start_at(at, from)?,
             }
-            self.piece(at, &mut piece)?;
+            if from.0 != to.0 {
+                self.piece(at, &mut piece)?;
+            }
         }
         ControlFlow::Continue(())
     }

@@ -1,7 +1,7 @@
 //! The last step of a run, with dense output.
 
-use crate::integration::Piece;
 use crate::integration::motion::Motion;
+use crate::integration::{Piece, PieceStart};
 use crate::solve::chebyshev::node;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
 
@@ -44,10 +44,12 @@ impl TaylorPolynomial {
 
 /// A step, with dense output between its ends.
 pub struct LastStep<'r> {
-    /// The start of the whole step, from which steps to points within it are taken; `None` where this is the whole step.
+    /// The point from which steps to points within it are taken, if it is not the start.
     origin: Option<Box<(f64, State)>>,
     from: (f64, State),
     to: (f64, State),
+    /// What happens at the end, if the state is replaced or its momentum jumps, and the state after it.
+    next: Option<Box<(PieceStart, (f64, State))>>,
     motion: &'r dyn Motion,
     stepper: &'r dyn Stepper,
     /// The curve of the step, if the method has one; computed on demand.
@@ -59,21 +61,32 @@ pub struct LastStep<'r> {
 impl<'r> LastStep<'r> {
     /// The step between two times with their states.
     pub(crate) fn new([from, to]: [(f64, State); 2], motion: &'r dyn Motion, stepper: &'r dyn Stepper) -> Self {
-        LastStep { origin: None, from, to, motion, stepper, curve: None, rates: [None, None] }
+        LastStep { origin: None, from, to, next: None, motion, stepper, curve: None, rates: [None, None] }
     }
 
-    /// The pieces of this step between its resets, in their order; none if it has no resets.
-    pub(crate) fn pieces(&self) -> impl Iterator<Item = Self> + '_ {
-        let of = |Piece { from, to, dense }: &Piece| LastStep {
-            origin: Some(Box::new(self.from.clone())),
-            from: from.clone(),
-            to: to.clone(),
-            motion: self.motion,
-            stepper: self.stepper,
-            curve: Some(dense.clone().map(Box::new)),
-            rates: [None, None],
+    /// The pieces of this step, in their order, each with what happens at its start; none if it was not divided.
+    pub(crate) fn pieces(&self) -> impl Iterator<Item = (PieceStart, Self)> + '_ {
+        let pieces = self.stepper.pieces();
+        let of = |(k, piece): (usize, &Piece)| {
+            // Steps into a piece are taken from the last point at which the motion can be started anew: at the zero of
+            // a switching function the side of the motion would have to be found again.
+            let origin = pieces.iter().take(k).rfind(|before| before.start == PieceStart::Regular);
+            let origin = origin.map_or(&self.from, |before| &before.from);
+            let is_regular = piece.start == PieceStart::Regular;
+            let next = pieces.get(k + 1).filter(|next| next.start > PieceStart::Zero);
+            let step = LastStep {
+                origin: (!is_regular).then(|| Box::new(origin.clone())),
+                from: piece.from.clone(),
+                to: piece.to.clone(),
+                next: next.map(|next| Box::new((next.start, next.from.clone()))),
+                motion: self.motion,
+                stepper: self.stepper,
+                curve: Some(piece.dense.clone().map(Box::new)),
+                rates: [None, None],
+            };
+            (piece.start, step)
         };
-        self.stepper.pieces().iter().map(of)
+        pieces.iter().enumerate().map(of)
     }
 
     /// The times of the step's start and end.
@@ -84,6 +97,12 @@ impl<'r> LastStep<'r> {
     /// The times and states of both ends.
     pub fn ends(&self) -> (&(f64, State), &(f64, State)) {
         (&self.from, &self.to)
+    }
+
+    /// What happens at the end, if the state is replaced or its momentum jumps, and the state from which the motion
+    /// continues.
+    pub(crate) fn next(&self) -> Option<&(PieceStart, (f64, State))> {
+        self.next.as_deref()
     }
 
     /// The time at a fraction of the step.

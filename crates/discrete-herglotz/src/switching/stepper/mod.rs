@@ -55,7 +55,7 @@ pub(crate) struct SwitchingStepper<'a> {
     /// The ends of these parts.
     ends: Vec<EndOfPart>,
     switched: bool,
-    /// The resets in the last steps, and the pieces of the last step between them.
+    /// The resets in the last steps, and the pieces of the last step if it had parts.
     resets: Vec<Reset>,
     pieces: Vec<Piece>,
     accumulation: Accumulation,
@@ -195,7 +195,7 @@ impl<'a> SwitchingStepper<'a> {
                 EvaluationRange::Within => true,
                 EvaluationRange::Extended(part) => !surfaces.are_near(system, &curve, part),
             };
-            if quiet && surfaces.first_change(system, &curve).is_none() && !self.is_too_long(&self.base) {
+            if quiet && matches!(surfaces.first_change(system, &curve), Ok(None)) && !self.is_too_long(&self.base) {
                 (self.here, self.sigma) = (curve.to, self.base.stepper().sigma());
                 return Ok(());
             }

@@ -1,6 +1,6 @@
 //! The parts of a step that end on the zeros of switching functions, or whose defect is within a bound.
 
-use crate::integration::{PartEnd, Piece, SolvedStages};
+use crate::integration::{PartEnd, Piece, PieceStart, SolvedStages};
 use crate::solve::roots::bracketed_root;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;
@@ -26,24 +26,22 @@ const FLIGHTS_PER_PART: f64 = 4.0;
 /// of the curve of the step.
 const MAX_NEWTON_ITERATIONS: usize = 8;
 
+/// The largest number of zeros that are located one before the other; then the part is halved.
+const MAX_EARLIER_ZEROS: usize = 16;
+
 /// A distance in time that is round-off, near a time in steps of length h.
 pub(crate) fn time_spacing(t: f64, h: f64) -> f64 {
     4.0 * f64::EPSILON * max_or_nan(t.abs(), h.abs())
 }
 
-/// A piece of a step since the last reset.
-struct OpenPiece {
-    from: TimedState,
-    /// The number of its parts, and the dense output of the last one.
-    parts: usize,
+/// The part that ends on the first zero.
+struct Located<'a> {
+    part: Part<'a>,
+    /// The curve on which the zero was found, and its sign change there.
+    curve: StepCurve,
+    change: SignChange,
+    /// The dense output of the part.
     dense: Option<DenseStep>,
-}
-
-impl OpenPiece {
-    fn add(&mut self, part: &PartStepper<'_>) {
-        self.parts += 1;
-        self.dense = part.stepper().dense();
-    }
 }
 
 /// A part of a step.
@@ -69,10 +67,13 @@ impl<'a> SwitchingStepper<'a> {
         let span = t_end - from.t;
         let spacing = 4.0 * f64::EPSILON * max_or_nan(max_or_nan(from.t.abs(), t_end.abs()), span.abs());
         let (mut longest, mut too_long, mut switches) = (span.abs(), false, false);
-        let mut piece = OpenPiece { from: from.clone(), parts: 0, dense: None };
+        let mut start = PieceStart::Regular;
         for _ in 0..MAX_PARTS {
             if (t_end - at.t) * span <= 0.0 {
-                self.end_piece(&mut piece, &at);
+                // The state after the end of the last part is that of the next step.
+                if start > PieceStart::Zero {
+                    self.add_piece(&at, &at, None, start);
+                }
                 return Ok((at, sigma));
             }
             let until = self.next_end(at.t, t_end);
@@ -93,8 +94,18 @@ impl<'a> SwitchingStepper<'a> {
                     continue;
                 }
             };
-            let curve = StepCurve::new(&*self.problem.system, [at.clone(), to], stepper.stepper().dense());
-            let change = self.surfaces.first_change(&*self.problem.system, &curve);
+            let system = self.problem.system.clone();
+            let curve = StepCurve::new(&*system, [at.clone(), to], stepper.stepper().dense());
+            let change = match self.surfaces.first_change(&*system, &curve) {
+                Ok(change) => change,
+                Err(cause) if (t - at.t).abs() <= 2.0 * spacing => return Err(cause),
+                Err(_) => {
+                    longest = 0.5 * (t - at.t).abs();
+                    continue;
+                }
+            };
+            let change =
+                change.filter(|change| t != t_end || !self.surfaces.is_left_to_next(&*system, &curve, change, spacing));
             too_long = change.is_none() && self.is_too_long(&stepper);
             if too_long {
                 longest = 0.5 * (t - at.t).abs();
@@ -102,15 +113,17 @@ impl<'a> SwitchingStepper<'a> {
             }
             let Some(change) = change else {
                 sigma *= stepper.stepper().sigma();
-                piece.add(&stepper);
                 let stages = self.keep(stepper);
-                let StepCurve { to, .. } = curve;
+                let StepCurve { to, dense, .. } = curve;
+                self.add_piece(&at, &to, dense, std::mem::replace(&mut start, PieceStart::Regular));
                 let (next, end) = (to.clone(), plain_end(t));
                 self.ends.push(EndOfPart { from: at, to: to.clone(), next, has_stepper: true, stages, end });
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
                 continue;
             };
-            let Some(Part { stepper, to }) = self.locate(&curve, &change, spacing) else {
+            let Some(Located { part: Part { stepper, to }, curve, change, dense }) =
+                self.first_zero(curve, change, spacing)
+            else {
                 // The curve crosses the surface, but the motion does not; the curve of a shorter part is more accurate.
                 longest = 0.5 * (t - at.t).abs();
                 continue;
@@ -124,7 +137,7 @@ impl<'a> SwitchingStepper<'a> {
                 }
                 Some(stepper) => {
                     sigma *= stepper.stepper().sigma();
-                    piece.add(&stepper);
+                    self.add_piece(&at, &to, dense, std::mem::replace(&mut start, PieceStart::Zero));
                     stages = self.keep(stepper);
                     changes_at_point = 0;
                 }
@@ -133,26 +146,23 @@ impl<'a> SwitchingStepper<'a> {
             if changes_at_point > MAX_CHANGES_AT_ONE_POINT {
                 return Err(StepError::Switching { t: at.t });
             }
-            let together = self.surfaces.simultaneous(&*self.problem.system, &curve, &change, &to, self.h);
-            let mut start = std::mem::replace(&mut at, to);
+            let together = self.surfaces.simultaneous(&*system, &curve, &change, &to, self.h);
+            let mut from_there = std::mem::replace(&mut at, to);
             for index in std::iter::once(change.index).chain(together) {
                 // A reset may have moved the motion away from another surface.
-                let system = &*self.problem.system;
-                if index != change.index && !self.surfaces.is_on(system, index, (at.t, &at.argument(system)), self.h) {
+                let there = at.argument(&*system);
+                if index != change.index && !self.surfaces.is_on(&*system, index, (at.t, &there), self.h) {
                     continue;
                 }
-                let resets = self.resets.len();
                 let rising = self.surfaces.side(index) < 0.0;
                 let Passed { to: next, factor, passage } = self.through(at.clone(), index, span, spacing)?;
                 let end = PartEnd::Switch { index, rising, passage };
                 // Further passages at the same point are ends of parts of length zero.
                 let (has_stepper, stages) = (std::mem::take(&mut has_stepper), stages.take());
-                self.ends.push(EndOfPart { from: start, to: at.clone(), next: next.clone(), has_stepper, stages, end });
-                if self.resets.len() > resets {
-                    self.end_piece(&mut piece, &at);
-                    piece = OpenPiece { from: next.clone(), parts: 0, dense: None };
-                }
-                (at, start, sigma) = (next.clone(), next, sigma * factor);
+                let (from, to, after) = (from_there, at.clone(), next.clone());
+                self.ends.push(EndOfPart { from, to, next: after, has_stepper, stages, end });
+                start = start.max(passage.into());
+                (at, from_there, sigma) = (next.clone(), next, sigma * factor);
             }
             // The curve of a part that is much longer than the next flight would round it away.
             longest = span.abs().min(FLIGHTS_PER_PART * self.accumulation.last_interval());
@@ -160,6 +170,25 @@ impl<'a> SwitchingStepper<'a> {
         }
         let divides = self.max_defect < f64::INFINITY && !switches;
         Err(if divides { StepError::Undivided { t: at.t } } else { StepError::Switching { t: at.t } })
+    }
+
+    /// The part that ends on the first zero. Beyond a kink or a jump the curve is not that of the motion, and before it
+    /// neither, as far as it is one polynomial: the curve of the part up to a zero may have an earlier one. `None` where
+    /// the motion does not cross the surface.
+    fn first_zero(&mut self, mut curve: StepCurve, mut change: SignChange, spacing: f64) -> Option<Located<'a>> {
+        let system = self.problem.system.clone();
+        for _ in 0..MAX_EARLIER_ZEROS {
+            let part = self.locate(&curve, &change, spacing)?;
+            let Some(stepper) = &part.stepper else { return Some(Located { part, curve, change, dense: None }) };
+            let dense = stepper.stepper().dense();
+            let shorter = StepCurve::new(&*system, [curve.from.clone(), part.to.clone()], dense);
+            match self.surfaces.earlier_change(&*system, &shorter, self.h) {
+                Ok(None) => return Some(Located { part, curve, change, dense: shorter.dense }),
+                Ok(Some(earlier)) => (curve, change) = (shorter, earlier),
+                Err(_) => return None,
+            }
+        }
+        None
     }
 
     /// Keeps the stepper of a part, if such are kept; otherwise returns its stages, if these are.
@@ -174,13 +203,10 @@ impl<'a> SwitchingStepper<'a> {
         }
     }
 
-    /// Ends the piece of a step that has resets.
-    fn end_piece(&mut self, piece: &mut OpenPiece, to: &TimedState) {
-        if !self.resets.is_empty() {
-            let dense = piece.dense.take().filter(|_| piece.parts == 1);
-            let from = (piece.from.t, piece.from.state.clone());
-            self.pieces.push(Piece { from, to: (to.t, to.state.clone()), dense });
-        }
+    /// Adds a part, which may have the length zero, to the pieces of the step.
+    fn add_piece(&mut self, from: &TimedState, to: &TimedState, dense: Option<DenseStep>, start: PieceStart) {
+        let of = |at: &TimedState| (at.t, at.state.clone());
+        self.pieces.push(Piece { from: of(from), to: of(to), dense, start });
     }
 
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.

@@ -17,7 +17,23 @@ pub(super) struct Passed {
     pub passage: Passage,
 }
 
+/// The time for which a motion that is pushed onto a surface is followed beyond it, as a fraction of a step.
+const PUSHED_TIME: f64 = 1e-3;
+
 impl SwitchingStepper<'_> {
+    /// Whether a reset holds a motion back that is pushed onto its surface: the motion that arrives a little later, with a
+    /// velocity, does not go on through the surface after the reset. A kick, which changes something else, does not.
+    fn holds_back(&mut self, index: usize, (t, x): (f64, &Point)) -> bool {
+        let (system, side) = (self.problem.system.clone(), self.surfaces.side(index));
+        let Ok((field, _)) = system.rates(t, x) else { return true };
+        let dt = PUSHED_TIME * self.h;
+        let later =
+            Point { q: &x.q + (&x.v + &field.y * (0.5 * dt)) * dt, v: &x.v + &field.y * dt, z: x.z + field.z * dt };
+        let AtSwitch::Replace { to, .. } = system.at_switch(index, t + dt, &later, side < 0.0) else { return true };
+        let after = self.surfaces.departure(&*system, index, (t + dt, &to), self.h, f64::INFINITY);
+        after.is_none_or(|Departure { side: next, with_rate, .. }| !with_rate || next * side >= 0.0)
+    }
+
     /// The passage of a zero.
     pub(super) fn through(
         &mut self,
@@ -62,14 +78,27 @@ impl SwitchingStepper<'_> {
         let (system, side, mut t) = (self.problem.system.clone(), self.surfaces.side(index), at.t);
         let from = at.point();
         let tolerance = self.surfaces.rounding(&*system, index, (t, &from), self.h);
+        let is_pushed = |departure: Option<Departure>| {
+            departure.is_some_and(|Departure { side: next, with_rate, .. }| !with_rate && next * side < 0.0)
+        };
+        let mut has_rate = || {
+            let arrival = self.surfaces.departure(&*system, index, (t, &from), self.h, tolerance);
+            arrival.is_some_and(|arrival| arrival.with_rate)
+        };
+        if to.v.iter().any(|v| !v.is_finite()) && !has_rate() {
+            // A law of impact has no state for a motion that arrives without velocity: nothing changes.
+            to = from.clone();
+        }
         let mut departure = self.surfaces.departure(&*system, index, (t, &to), self.h, tolerance);
         let rate = departure.map_or(0.0, |departure| departure.rate);
         let resolution = Resolution { h: self.h, spacing, rate, rounding: tolerance };
         let mut limit = self.accumulation.add(index, t, &resolution);
         // A state that is stopped on the surface and pushed through it is the limit of impacts too.
-        if departure.is_some_and(|Departure { side: next, with_rate, .. }| !with_rate && next * side < 0.0) {
+        let is_limit = limit.is_some();
+        if is_pushed(departure) && self.holds_back(index, (t, &to)) {
             limit = Some(t);
         }
+        let mut stays = false;
         let mut passage = Passage::Reset;
         if let Some(limit) = limit {
             passage = Passage::Accumulation;
@@ -77,8 +106,15 @@ impl SwitchingStepper<'_> {
                 AtSwitch::Replace { to: rest, factor: None } => {
                     (to, t) = (rest, limit);
                     departure = self.surfaces.departure(&*system, index, (t, &to), self.h, tolerance);
+                    if is_pushed(departure) {
+                        return Err(StepError::Contact { t });
+                    }
+                    // A state that stays on a surface with one side remains on that side.
+                    stays = self.surfaces.rounding(&*system, index, (t, &to), self.h) > 0.0
+                        && matches!(system.at_switch(index, t, &to, side > 0.0), AtSwitch::Continue);
                 }
-                _ => return Err(StepError::Accumulation { t: limit }),
+                _ if is_limit => return Err(StepError::Accumulation { t: limit }),
+                _ => return Err(StepError::Contact { t }),
             }
             self.accumulation = Accumulation::default();
         }
@@ -90,7 +126,8 @@ impl SwitchingStepper<'_> {
         if side * value < -max_or_nan(tolerance, self.surfaces.rounding(&*system, index, (t, &to), self.h)) {
             return Err(StepError::ResetBeyond { t });
         }
-        self.surfaces.reset(&*system, (index, departure), t, [&from, &to], self.h);
+        let next = departure.map(|departure| departure.side).or(stays.then_some(side));
+        self.surfaces.reset(&*system, (index, next), t, [&from, &to], self.h);
         self.changed_energy |= factor.is_none();
         self.resets.push(Reset { t, index, before: at.state, after: state.clone() });
         let rests = StepStart::zeros(to.v.len());
