@@ -40,10 +40,6 @@ const POINT_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 /// goes: the Taylor polynomial of the motion is exact enough, and changes are far above their round-off.
 const DEPARTURE: f64 = 1e-5;
 
-/// The largest distance of a sign change from the end of a step, in units of the round-off of the time, at which it may be
-/// on the end up to the round-off of the state.
-const END_SPACINGS: f64 = 1024.0;
-
 /// The part of the change by the second derivative, over [`DEPARTURE`], below which a rate is none: the motion would
 /// return to the surface within 1e-12 of a step.
 const MIN_RATE: f64 = 1e-7;
@@ -318,6 +314,7 @@ impl Surfaces {
         self.is_on(system, index, at, 0.0)
     }
 
+<<<<<<< ours
     /// Whether a sign change at the end of a step is a reset that is left to the start of the next step, or to the run
     /// that continues this one.
     pub fn is_left_to_next(
@@ -333,6 +330,8 @@ impl Surfaces {
             && has_reset(system, index, (to.t, &to.argument(system)), self.side(index) < 0.0)
     }
 
+=======
+>>>>>>> theirs
     /// Whether a point is on a surface up to round-off.
     pub fn is_on(&mut self, system: &dyn System, index: usize, (t, x): (f64, &Point), h: f64) -> bool {
         let rounding = self.rounding(system, index, (t, x), h);
@@ -352,9 +351,17 @@ impl Surfaces {
         // Where the function of the zero has its new sign.
         let (t, end) = curve.at(change.ends[1]);
         let others = (0..self.sides.len()).filter(|i| *i != change.index);
+<<<<<<< ours
         let changed =
             |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(system, i, (t, &end))) < 0.0;
         others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.argument(system)), h)).collect()
+=======
+        let changed = |surfaces: &mut Self, i: usize| {
+            let beyond = -surfaces.side(i) * surfaces.value(system, i, (t, &end));
+            beyond > 0.0 && beyond > surfaces.rounding(system, i, (t, &end), 0.0)
+        };
+        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.point()), h)).collect()
+>>>>>>> theirs
     }
 
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
@@ -488,6 +495,7 @@ impl Surfaces {
                     *slot = own;
                 }
             }
+            let ends = ends.filter(|_| !self.is_left_to_next(system, curve, index, &samples));
             let change = ends.map(|ends| self.change(system, curve, index, ends));
             first = [first, change].into_iter().flatten().min_by(|a, b| a.estimate.total_cmp(&b.estimate));
         }
@@ -506,6 +514,17 @@ impl Surfaces {
             }
             _ => Ok(first),
         }
+    }
+
+    /// Whether the function of a reset goes beyond its surface only up to the round-off of the end of a curve. Then the
+    /// motion is on the surface, and the reset is left to what follows: the next part or step, or the run that continues
+    /// this one.
+    fn is_left_to_next(&mut self, system: &dyn System, curve: &StepCurve, index: usize, samples: &Samples) -> bool {
+        let (side, to) = (self.side(index), (curve.to.t, &curve.to.point()));
+        let rounding = self.rounding(system, index, to, 0.0);
+        // Written so that a NaN is beyond.
+        let within = samples.values().iter().all(|value| side * value >= -rounding);
+        within && has_reset(system, index, to, side < 0.0)
     }
 
     /// The side of a function with the fraction of the step from which it has one, and the fractions between which it

@@ -104,8 +104,6 @@ impl<'a> SwitchingStepper<'a> {
                     continue;
                 }
             };
-            let change =
-                change.filter(|change| t != t_end || !self.surfaces.is_left_to_next(&*system, &curve, change, spacing));
             too_long = change.is_none() && self.is_too_long(&stepper);
             if too_long {
                 longest = 0.5 * (t - at.t).abs();
