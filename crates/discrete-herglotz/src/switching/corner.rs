@@ -1,7 +1,7 @@
 //! The corner conditions at a jump of the Lagrangian.
 
 use super::one_sided::{MAX_ITERATIONS, OneSided, STAGNATION_ROUND_OFF};
-use super::surfaces::{Surfaces, TimedState};
+use super::{step_curve::TimedState, surfaces::Surfaces};
 use crate::{Point, State, StepError, System, Vector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 

@@ -1,7 +1,10 @@
 //! Jumps of a Lagrangian between two points of a motion.
 
 use super::corner::{Corner, corner};
-use super::surfaces::{StepCurve, Surfaces, TimedState, sign};
+use super::{
+    step_curve::{StepCurve, TimedState},
+    surfaces::{Surfaces, sign},
+};
 use crate::gauss::StepStart;
 use crate::integration::OfTyped;
 use crate::integration::state_at;

@@ -12,6 +12,7 @@ mod divided;
 mod jumps;
 mod local_motion;
 mod one_sided;
+mod step_curve;
 pub(crate) mod stepper;
 mod surfaces;
 

@@ -1,6 +1,6 @@
 //! One-sided limits of L, or of a contact Hamiltonian, at a surface where they jump.
 
-use super::surfaces::TimedState;
+use super::step_curve::TimedState;
 use crate::system::products::times;
 use crate::{Point, State, StepError, System, Vector};
 use contact_geom::nalgebra::{DMatrix, DVectorViewMut};

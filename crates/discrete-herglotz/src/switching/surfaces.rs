@@ -1,26 +1,14 @@
 //! The switching functions of a Lagrangian along a step.
 
-use crate::gauss::StepStart;
-use crate::integration::{hermite, state_at};
 use crate::solve::chebyshev::{Samples, node};
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
-use crate::switching::local_motion::{LocalMotion, phase_point, rates_along_motion};
+use crate::switching::local_motion::{LocalMotion, rates_along_motion};
+use crate::switching::step_curve::{StepCurve, TimedState};
 use crate::system::AtSwitch;
-use crate::{DenseStep, InputError, Point, State, StepError, System, Vector};
+use crate::{InputError, Point, StepError, System, Vector};
 use contact_geom::numbers::max_or_nan;
 use std::convert::Infallible;
-
-/// The number of equal parts in which a curve without dense output is searched for jumps.
-const DEFAULT_PARTS: usize = 8;
-
-/// The degree of interpolation of a function along a step without dense output: nearly twice that of a search for
-/// events, since a sign change that is missed spoils the step.
-const DEFAULT_DEGREE: usize = 7;
-
-/// The largest number of stages with which the cubic Hermite polynomial, of order 4, is used in place of the
-/// collocation polynomial, whose order between the ends of the step is the number of stages.
-const MAX_HERMITE_STAGES: usize = 2;
 
 /// The round-off of a switching function, relative to its size on a step: that of the sums of the curve.
 const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
@@ -61,118 +49,9 @@ pub(crate) fn has_switching_functions(system: &dyn System, t: f64, x: &Point) ->
     }
 }
 
-/// A time and a state of the motion, with its velocity.
-#[derive(Clone, Debug)]
-pub(super) struct TimedState {
-    pub t: f64,
-    pub state: State,
-    pub v: Vector,
-    /// The compensation terms of the sums of the stepper, beyond the last digits of the state.
-    pub rests: StepStart,
-}
-
-impl TimedState {
-    /// The point `(q, v, z)`.
-    pub fn point(&self) -> Point {
-        Point { q: self.state.q.clone(), v: self.v.clone(), z: self.state.z }
-    }
-
-    /// The motion at a point at which switching functions are evaluated; 0 in the place of a velocity that is not defined.
-    pub fn of_argument(system: &dyn System, t: f64, x: &Point) -> Self {
-        let n = x.q.len();
-        let (state, v) = match system.hints().hamiltonian {
-            true => {
-                let v = rates_along_motion(system, t, x).map_or_else(|| Vector::zeros(n), |rates| rates.x);
-                (State { q: x.q.clone(), p: x.v.clone(), z: x.z }, v)
-            }
-            false => (state_at(system, t, x), x.v.clone()),
-        };
-        TimedState { t, state, v, rests: StepStart::zeros(n) }
-    }
-
-    /// The point at which switching functions are evaluated: `(q, v, z)`, or `(q, p, z)` with the momentum in the place of
-    /// the velocity for a system that is given by a contact Hamiltonian.
-    pub fn argument(&self, system: &dyn System) -> Point {
-        if system.hints().hamiltonian { phase_point(&self.state) } else { self.point() }
-    }
-}
-
 /// Whether the state is replaced where a function crosses zero in this direction.
 fn has_reset(system: &dyn System, index: usize, (t, x): (f64, &Point), rising: bool) -> bool {
     matches!(system.at_switch(index, t, x, rising), AtSwitch::Replace { .. })
-}
-
-/// The curve of a step: its collocation polynomial, or the cubic Hermite polynomial through both ends with their
-/// velocities.
-pub(super) struct StepCurve {
-    pub from: TimedState,
-    pub to: TimedState,
-    pub dense: Option<DenseStep>,
-    /// For a system that is given by a contact Hamiltonian the derivatives of the momenta at both ends, where they are
-    /// interpolated, and otherwise nothing.
-    forces: Option<[Vector; 2]>,
-    is_hamiltonian: bool,
-}
-
-impl StepCurve {
-    /// The curve of a step of a system, with its dense output if it has one.
-    pub fn new(system: &dyn System, [from, to]: [TimedState; 2], dense: Option<DenseStep>) -> Self {
-        let is_hamiltonian = system.hints().hamiltonian;
-        let forces = (is_hamiltonian && dense.is_none()).then(|| {
-            [&from, &to].map(|at| {
-                let field = rates_along_motion(system, at.t, &phase_point(&at.state));
-                field.map_or_else(|| Vector::zeros(at.v.len()), |field| field.y)
-            })
-        });
-        StepCurve { from, to, dense, forces, is_hamiltonian }
-    }
-
-    pub(super) fn parts(&self) -> usize {
-        DEFAULT_PARTS
-    }
-
-    /// The degree with which a function is interpolated first: with its value at the start, it is evaluated `s + 2`
-    /// times on a step with s stages.
-    fn sampling_degree(&self) -> usize {
-        self.collocation().map_or(DEFAULT_DEGREE, |dense| dense.sampling_degree() - 1)
-    }
-
-    /// The collocation polynomial, if it is the more accurate curve. It always is for a contact Hamiltonian, whose
-    /// velocities may jump at the ends of a step.
-    fn collocation(&self) -> Option<&DenseStep> {
-        self.dense.as_ref().filter(|dense| dense.stages() > MAX_HERMITE_STAGES || self.is_hamiltonian)
-    }
-
-    /// The interpolant through both ends, extrapolated outside of the step.
-    fn between_ends(&self, fraction: f64) -> Point {
-        let (span, [from, to]) = (self.span(), [&self.from, &self.to]);
-        let x = hermite(&from.point(), &to.point(), span, fraction * span);
-        let Some([at_start, at_end]) = &self.forces else { return x };
-        let momenta = |at: &TimedState, rate: &Vector| Point { q: at.state.p.clone(), v: rate.clone(), z: at.state.z };
-        let p = hermite(&momenta(from, at_start), &momenta(to, at_end), span, fraction * span).q;
-        Point { v: p, ..x }
-    }
-
-    pub fn span(&self) -> f64 {
-        self.to.t - self.from.t
-    }
-
-    /// The time and the point, for switching functions, at a fraction of the step.
-    pub(super) fn at(&self, fraction: f64) -> (f64, Point) {
-        let t = self.from.t + fraction * self.span();
-        if fraction == 1.0 {
-            return (self.to.t, if self.is_hamiltonian { phase_point(&self.to.state) } else { self.to.point() });
-        }
-        let x = match self.collocation() {
-            Some(dense) if self.is_hamiltonian => phase_point(&dense.at_fraction(fraction)),
-            Some(dense) => {
-                let x = dense.at_fraction(fraction);
-                Point { q: x.q, v: dense.velocity(t), z: x.z }
-            }
-            None => self.between_ends(fraction),
-        };
-        (t, x)
-    }
 }
 
 /// A sign change on the curve of a step: the index of the function, the fractions of the step between which it lies,
@@ -314,24 +193,6 @@ impl Surfaces {
         self.is_on(system, index, at, 0.0)
     }
 
-<<<<<<< ours
-    /// Whether a sign change at the end of a step is a reset that is left to the start of the next step, or to the run
-    /// that continues this one.
-    pub fn is_left_to_next(
-        &mut self,
-        system: &dyn System,
-        curve: &StepCurve,
-        change: &SignChange,
-        spacing: f64,
-    ) -> bool {
-        let (to, index) = (&curve.to, change.index);
-        ((1.0 - change.estimate) * curve.span()).abs() <= END_SPACINGS * spacing
-            && self.is_on_without_motion(system, index, (to.t, &to.argument(system)))
-            && has_reset(system, index, (to.t, &to.argument(system)), self.side(index) < 0.0)
-    }
-
-=======
->>>>>>> theirs
     /// Whether a point is on a surface up to round-off.
     pub fn is_on(&mut self, system: &dyn System, index: usize, (t, x): (f64, &Point), h: f64) -> bool {
         let rounding = self.rounding(system, index, (t, x), h);
@@ -351,17 +212,11 @@ impl Surfaces {
         // Where the function of the zero has its new sign.
         let (t, end) = curve.at(change.ends[1]);
         let others = (0..self.sides.len()).filter(|i| *i != change.index);
-<<<<<<< ours
-        let changed =
-            |surfaces: &mut Self, i: usize| surfaces.side(i) * sign(surfaces.value(system, i, (t, &end))) < 0.0;
-        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.argument(system)), h)).collect()
-=======
         let changed = |surfaces: &mut Self, i: usize| {
             let beyond = -surfaces.side(i) * surfaces.value(system, i, (t, &end));
             beyond > 0.0 && beyond > surfaces.rounding(system, i, (t, &end), 0.0)
         };
-        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.point()), h)).collect()
->>>>>>> theirs
+        others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.argument(system)), h)).collect()
     }
 
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
@@ -520,7 +375,7 @@ impl Surfaces {
     /// motion is on the surface, and the reset is left to what follows: the next part or step, or the run that continues
     /// this one.
     fn is_left_to_next(&mut self, system: &dyn System, curve: &StepCurve, index: usize, samples: &Samples) -> bool {
-        let (side, to) = (self.side(index), (curve.to.t, &curve.to.point()));
+        let (side, to) = (self.side(index), (curve.to.t, &curve.to.argument(system)));
         let rounding = self.rounding(system, index, to, 0.0);
         // Written so that a NaN is beyond.
         let within = samples.values().iter().all(|value| side * value >= -rounding);

@@ -18,7 +18,10 @@ use crate::switching::stepper::evaluation_range::EvaluationRange;
 use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::stepper::parts::time_spacing;
 use crate::switching::stepper::solved_parts::EndOfPart;
-use crate::switching::surfaces::{StepCurve, Surfaces, TimedState};
+use crate::switching::{
+    step_curve::{StepCurve, TimedState},
+    surfaces::Surfaces,
+};
 use crate::{InputError, StepError, UnresolvedStep};
 
 /// Constructs a stepper for a problem and a step length; the last argument is whether the steps are parts that end on

@@ -6,7 +6,10 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;
 use crate::switching::stepper::passage::Passed;
 use crate::switching::stepper::solved_parts::EndOfPart;
-use crate::switching::surfaces::{SignChange, StepCurve, TimedState};
+use crate::switching::{
+    step_curve::{StepCurve, TimedState},
+    surfaces::SignChange,
+};
 use crate::{DenseStep, StepError};
 use contact_geom::numbers::max_or_nan;
 

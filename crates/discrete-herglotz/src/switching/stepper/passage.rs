@@ -5,7 +5,7 @@ use crate::integration::{Passage, Reset, state_at};
 use crate::switching::corner::{Corner, corner};
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::accumulation::{Accumulation, Resolution};
-use crate::switching::surfaces::{Departure, TimedState};
+use crate::switching::{step_curve::TimedState, surfaces::Departure};
 use crate::system::AtSwitch;
 use crate::{Point, State, StepError, Vector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};

@@ -4,9 +4,9 @@ use crate::gauss::{CollocationStepper, DefectSample};
 use crate::integration::{SolvedPart, SolvedStages};
 use crate::numbers::state_words::{Saved, load_option, save_option, saved};
 use crate::status::first;
+use crate::switching::step_curve::TimedState;
 use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::part_stepper::PartStepper;
-use crate::switching::surfaces::TimedState;
 use crate::{
     DenseStep, PlanEntry, RunSupport, State, StepDetails, StepFailure, Stepper, UnresolvedStep, Vector,
     integration::{Piece, Reset, SuspectInterval},

@@ -1,8 +1,8 @@
 //! The parts of the last step with their stages and with what happened at their ends, for derivatives.
 
 use crate::integration::{PartEnd, PartPoint, SolvedPart, SolvedStages, StepEnds, WholeStep};
+use crate::switching::step_curve::TimedState;
 use crate::switching::stepper::SwitchingStepper;
-use crate::switching::surfaces::TimedState;
 
 /// The end of a part of a step.
 #[derive(Clone, Debug)]
