@@ -94,7 +94,7 @@ impl StepCurve {
     }
 
     /// The interpolant through both ends, extrapolated outside of the step.
-    fn between_ends(&self, fraction: f64) -> Point {
+    pub fn between_ends(&self, fraction: f64) -> Point {
         let (span, [from, to]) = (self.span(), [&self.from, &self.to]);
         let x = hermite(&from.point(), &to.point(), span, fraction * span);
         let Some([at_start, at_end]) = &self.forces else { return x };
