@@ -306,3 +306,25 @@ fn a_reset_that_is_undefined_beyond_its_zero_is_an_error() {
         assert!(refused.contains("not finite at t = "), "{refused}");
     }
 }
+
+/// Steps with impacts that change the energy are not taken for unresolved ones: on a surface that moves, elastic, and
+/// with a conformal factor.
+#[test]
+fn impacts_that_change_the_energy_are_resolved() {
+    let ball = Formula::parse("x'^2/2 - x - 0.1*z", &["x"], &[]).unwrap();
+    for (surface, law) in [
+        ("x - 0.1*cos(2*t)", Impact::Elastic),
+        ("x - 0.1*cos(2*t)", Impact::Conformal(0.8)),
+        ("x", Impact::Conformal(0.8)),
+        ("x", Impact::Elastic),
+    ] {
+        let system = System::new(&ball.with_impact(surface, law, None).unwrap()).unwrap();
+        let run = |step_control| {
+            let motion = Motion::new(Start::new(0.0, [1.0], [0.3], 0.0), 4.0, step_control);
+            system.run(&motion, &mut ()).unwrap()
+        };
+        let (found, expected) = (run(by_steps(4, 0.05)), run(accurate(1e-11)));
+        assert_eq!((found.status, found.unresolved), (Status::Completed, None), "{surface}, {law:?}");
+        assert!((found.q[0] - expected.q[0]).abs() < 1e-9, "{surface}, {law:?}: {} {}", found.q[0], expected.q[0]);
+    }
+}

@@ -7,7 +7,7 @@ use crate::switching::stepper::SwitchingStepper;
 use crate::switching::stepper::accumulation::{Accumulation, Resolution};
 use crate::switching::{step_curve::TimedState, surfaces::Departure};
 use crate::system::AtSwitch;
-use crate::{Point, State, StepError, Vector};
+use crate::{Point, State, StepError, System, Vector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 
 /// The state after a zero, on the side where the motion continues, with the conformal factor of the passage.
@@ -19,6 +19,15 @@ pub(super) struct Passed {
 
 /// The time for which a motion that is pushed onto a surface is followed beyond it, as a fraction of a step.
 const PUSHED_TIME: f64 = 1e-3;
+
+/// The relative change of the energy, beyond that by the conformal factor, above which it is none by round-off.
+const MAX_ENERGY_CHANGE: f64 = 1e-12;
+
+/// The energy `v . L_v - L` at a point, and the size of its terms.
+fn energy(system: &dyn System, t: f64, x: &Point) -> (f64, f64) {
+    let (product, l) = (x.v.dot(&system.gradient(t, x).y), system.value(t, x));
+    (product - l, product.abs() + l.abs())
+}
 
 impl SwitchingStepper<'_> {
     /// Whether a reset holds a motion back that is pushed onto its surface: the motion that arrives a little later, with a
@@ -128,7 +137,12 @@ impl SwitchingStepper<'_> {
         }
         let next = departure.map(|departure| departure.side).or(stays.then_some(side));
         self.surfaces.reset(&*system, (index, next), t, [&from, &to], self.h);
-        self.changed_energy |= factor.is_none();
+        // The energy grows by the factor, unless the surface moves or the law of the reset changes it.
+        let grown = |factor: f64| {
+            let [(before, size), (after, size_after)] = [&from, &to].map(|x| energy(&*system, t, x));
+            (after - factor * before).abs() <= MAX_ENERGY_CHANGE * (size + size_after)
+        };
+        self.changed_energy |= !factor.is_some_and(grown);
         self.resets.push(Reset { t, index, before: at.state, after: state.clone() });
         let rests = StepStart::zeros(to.v.len());
         Ok((TimedState { t, state, v: to.v, rests }, passage))
