@@ -2,6 +2,7 @@
 //! time, so that it is compiled once, with this crate.
 
 use crate::breaks::Kinks;
+use crate::cones::has_cones;
 use crate::derived_reset::DerivedReset;
 use crate::drag::ProvedForce;
 use crate::evaluation::At;
@@ -30,6 +31,8 @@ pub(crate) struct Derived {
     /// Proved for all values of the parameters, except `z_free`, which refers to the present value of a constant rate.
     pub structure: Structure,
     pub smooth: bool,
+    /// Whether a norm, or another root, may vanish along a motion.
+    pub cones: bool,
     pub cyclic: Vec<bool>,
     /// `L_q`, `L_v` and `L_z`.
     pub partials: Vec<Id>,
@@ -130,6 +133,7 @@ impl Derived {
         let mut free = |i: usize| needed.get(graph.position(i as u32).index()) != Some(&true);
         let cyclic = (0..n).map(&mut free).collect();
         let smooth = sources.iter().all(|id| kinks(&graph, *id) == Inputs::NONE);
+        let cones = has_cones(&graph, &sources);
         let kinks = Kinks::of(&mut graph, &sources)?;
         let triggers = formula.resets.iter().map(|reset| reset.when);
         let functions: Vec<Id> = kinks.functions.iter().copied().chain(triggers).collect();
@@ -152,6 +156,7 @@ impl Derived {
             formula,
             structure,
             smooth,
+            cones,
             cyclic,
             partials,
             value,

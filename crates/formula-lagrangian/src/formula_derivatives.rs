@@ -146,6 +146,11 @@ impl FormulaDerivatives {
         Some(other)
     }
 
+    /// Whether L or a force contains a norm, or another root, that may vanish along a motion.
+    pub fn has_cones(&self) -> bool {
+        self.derived.cones
+    }
+
     /// The times of kinks and jumps.
     pub fn breaks(&self) -> &[f64] {
         &self.derived.breaks

@@ -330,4 +330,10 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
     fn breaks(&self) -> &[f64] {
         &self.derived().breaks
     }
+
+    /// Whether L or a force contains `sqrt`, `hypot`, `atan2` or a fractional power whose argument may vanish along a
+    /// motion. Of a sum of squares with a positive number it cannot, nor where L becomes infinite.
+    fn has_cones(&self) -> bool {
+        self.derived().cones
+    }
 }

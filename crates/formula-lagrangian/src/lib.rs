@@ -134,6 +134,7 @@
 //! at most 256 registers, including its `2 n + 2` inputs.
 
 mod breaks;
+mod cones;
 mod constraints;
 mod degrees;
 mod derivatives;

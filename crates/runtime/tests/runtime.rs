@@ -2,6 +2,7 @@
 
 #![allow(missing_docs)]
 
+mod accuracy;
 mod body;
 mod divided_steps;
 mod fit;

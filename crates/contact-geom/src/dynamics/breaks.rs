@@ -66,6 +66,9 @@ impl<const N: usize, L: Lagrangian<N>> Lagrangian<N> for Breaks<L> {
     fn breaks(&self) -> &[f64] {
         &self.times
     }
+    fn has_cones(&self) -> bool {
+        self.lagrangian.has_cones()
+    }
 }
 
 /// The parameters of the Lagrangian; the times are none of them, since a run is not differentiated in its breaks.

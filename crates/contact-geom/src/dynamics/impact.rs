@@ -268,4 +268,7 @@ impl<const N: usize, L: Lagrangian<N>, S: Surface<N>> Lagrangian<N> for Impacts<
     fn breaks(&self) -> &[f64] {
         self.lagrangian.breaks()
     }
+    fn has_cones(&self) -> bool {
+        self.lagrangian.has_cones()
+    }
 }

@@ -224,6 +224,14 @@ pub trait Lagrangian<const N: usize> {
         &[]
     }
 
+    /// Whether L or the applied force contains a norm, or another root, that may vanish along the motion, as
+    /// `sqrt(x^2 + y^2)` at the origin. Its derivative jumps there, at a point of the cone and not on a surface, so that
+    /// it is no zero of a switching function: searches for an accuracy also examine the ends of steps. `false` by
+    /// default.
+    fn has_cones(&self) -> bool {
+        false
+    }
+
     /// The rate `g(q) = dt/dtau` of a time transformation, in whose time tau steps of equal length suit this motion, for
     /// autonomous Lagrangians. It must be positive and should decrease where the motion gets faster. Set
     /// [`Hints::time_transformation`] as well; by default tau is the time itself.
@@ -390,6 +398,9 @@ macro_rules! forward_lagrangian {
         }
         fn breaks(&$self) -> &[f64] {
             $to.breaks()
+        }
+        fn has_cones(&$self) -> bool {
+            $to.has_cones()
         }
     };
 }

@@ -122,6 +122,9 @@ macro_rules! lagrangian_enum {
             fn breaks(&self) -> &[f64] {
                 match self { $($name::$variant(lagrangian) => $crate::Lagrangian::<$n>::breaks(lagrangian),)* }
             }
+            fn has_cones(&self) -> bool {
+                match self { $($name::$variant(lagrangian) => $crate::Lagrangian::<$n>::has_cones(lagrangian),)* }
+            }
         }
     };
     (parametric $name:ident<$n:literal> { $($variant:ident),* $(,)? }) => {

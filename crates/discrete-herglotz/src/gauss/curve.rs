@@ -8,6 +8,7 @@ mod comparison;
 mod sample;
 
 use crate::gauss::dense::SolvedStep;
+use crate::gauss::resolution::defect_sample::{DefectSample, SAMPLE_SETS};
 use crate::gauss::stages::stage_values::CondensedStages;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
@@ -17,6 +18,26 @@ use crate::numbers::registers::{Stages, blocks};
 use contact_geom::Scalar;
 use pulp::{Simd, WithSimd};
 pub(crate) use sample::SampleKernel;
+
+/// The set of sample points next to the ends of the step.
+pub(crate) const ENDS: usize = SAMPLE_SETS;
+
+impl dyn CollocationSystem + '_ {
+    /// The largest defect of a curve over a number of sets of sample points between its nodes, `None` for 0. A kink or a
+    /// jump that no switching function shows may lie beyond the outermost of them, so that the ends count too if the
+    /// system may have one.
+    pub(crate) fn defect_of(
+        &self,
+        arch: Instructions,
+        curve: &Curve,
+        transformed: bool,
+        sets: usize,
+    ) -> Option<DefectSample> {
+        let at = |set| self.sample_defect(arch, curve, transformed, set);
+        let between = (0..sets).map(at).reduce(DefectSample::and)?;
+        Some(if self.has_cones() { between.with_ends(at(ENDS)) } else { between })
+    }
+}
 
 /// A solved step: its start, and the polynomials through its stages `V`, `rho L_q`, `rho L_z` and L. With a time
 /// transformation they are polynomials in tau, each multiplied by the rate dt/dtau.

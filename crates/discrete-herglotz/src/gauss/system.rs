@@ -131,6 +131,9 @@ pub(crate) trait SystemAtPoints {
     /// Whether there may be an applied force.
     fn is_forced(&self) -> bool;
 
+    /// Whether there are norms that may vanish; see [`System::has_cones`](crate::System::has_cones).
+    fn has_cones(&self) -> bool;
+
     /// The value of L.
     fn value(&self, t: f64, x: PointRef<'_>) -> f64;
 
@@ -235,6 +238,10 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
 
     fn is_forced(&self) -> bool {
         L::HINTS.forced
+    }
+
+    fn has_cones(&self) -> bool {
+        self.0.has_cones()
     }
 
     fn value(&self, t: f64, x: PointRef<'_>) -> f64 {

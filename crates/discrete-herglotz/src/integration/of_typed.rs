@@ -107,6 +107,9 @@ impl<const N: usize> System for OfTyped<'_, N> {
     fn breaks(&self) -> &[f64] {
         self.0.breaks()
     }
+    fn has_cones(&self) -> bool {
+        self.0.has_cones()
+    }
     fn dt_dtau(&self, q: &Vector) -> f64 {
         self.0.dt_dtau(&q.fixed())
     }

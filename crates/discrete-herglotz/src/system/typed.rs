@@ -97,6 +97,9 @@ pub trait TypedSystem<const N: usize> {
     /// The times at which L or the applied force has a kink or a jump in time.
     fn breaks(&self) -> &[f64];
 
+    /// Whether L or the applied force contains a norm, or another root, that may vanish along the motion.
+    fn has_cones(&self) -> bool;
+
     /// The rate `dt/dtau` of the time transformation.
     fn dt_dtau(&self, q: &SVector<f64, N>) -> f64;
 }
@@ -184,6 +187,9 @@ impl<L: Lagrangian<N>, const N: usize> TypedSystem<N> for L {
     }
     fn breaks(&self) -> &[f64] {
         Lagrangian::breaks(self)
+    }
+    fn has_cones(&self) -> bool {
+        Lagrangian::has_cones(self)
     }
     fn dt_dtau(&self, q: &SVector<f64, N>) -> f64 {
         Lagrangian::dt_dtau(self, q)

@@ -1,5 +1,6 @@
 //! The sample points of a step, between its nodes.
 
+use crate::gauss::curve::ENDS;
 use crate::gauss::resolution::defect_sample::SAMPLE_SETS;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
 use crate::numbers::array::from_fn;
@@ -7,6 +8,10 @@ use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{StageMap, Stages, blocks};
 use pulp::Simd;
 use std::sync::OnceLock;
+
+/// The distance of the sample points of [`ENDS`] from the ends, as a fraction of the step: at a kink on which a step ends
+/// the gradient need not exist.
+const END_DISTANCE: f64 = 1.0 / (1u64 << 30) as f64;
 
 /// The linear maps from the s stages to s sample points between the nodes.
 pub(super) struct Between {
@@ -18,11 +23,12 @@ pub(super) struct Between {
 }
 
 impl Between {
-    /// The maps of one set of sample points, for a number of stages from 1 to 16; computed once.
+    /// The maps of one set of sample points, for a number of stages from 1 to 16; computed once. The set
+    /// [`ENDS`] has points next to the ends of the step.
     pub fn of(s: usize, set: usize) -> &'static Between {
-        static TABLES: [[OnceLock<Box<Between>>; SAMPLE_SETS]; MAX_STAGES] =
-            [const { [const { OnceLock::new() }; SAMPLE_SETS] }; MAX_STAGES];
-        let (s, set) = (s.clamp(1, MAX_STAGES), set.min(SAMPLE_SETS - 1));
+        static TABLES: [[OnceLock<Box<Between>>; SAMPLE_SETS + 1]; MAX_STAGES] =
+            [const { [const { OnceLock::new() }; SAMPLE_SETS + 1] }; MAX_STAGES];
+        let (s, set) = (s.clamp(1, MAX_STAGES), set.min(ENDS));
         TABLES[s - 1][set].get_or_init(|| Box::new(Self::new(s, set)))
     }
 
@@ -52,6 +58,9 @@ impl Between {
         let points = from_fn(|i| match set {
             0 if i + 1 < s => inner.c[i].0,
             0 => end,
+            // A step of one stage has one sample point; the next point is the start of the next step.
+            ENDS if i == 0 && s > 1 => END_DISTANCE,
+            ENDS => 1.0 - END_DISTANCE,
             _ => (i.min(s - 1) as f64 + (set as f64 * GOLDEN_RATIO).fract()) / s as f64,
         });
         let [value, integral] = lagrange_rows(s, &points);

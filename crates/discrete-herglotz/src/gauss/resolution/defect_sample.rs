@@ -64,6 +64,16 @@ impl DefectSample {
         DefectSample { follows_a_jump: true, ..self }
     }
 
+    /// Combined with a sample at the ends of the same step.
+    pub fn with_ends(self, ends: DefectSample) -> DefectSample {
+        DefectSample {
+            defect: max_or_nan(self.defect, END_WEIGHT * ends.defect),
+            of_momenta: max_or_nan(self.of_momenta, END_WEIGHT * ends.of_momenta),
+            of_action: max_or_nan(self.of_action, END_WEIGHT * ends.of_action),
+            ..self
+        }
+    }
+
     /// Combined with a sample at other points of the same step.
     pub fn and(self, other: DefectSample) -> DefectSample {
         DefectSample {
@@ -75,6 +85,12 @@ impl DefectSample {
         }
     }
 }
+
+/// The part of a defect at the ends of a step that counts as a defect between the nodes. A smooth curve has its largest
+/// defect there, some three times as large as between the nodes. Beyond the outermost sample points lies at most a
+/// thirtieth of a step of two stages or more, and the momenta change by at most that part of the defect if a kink is
+/// there.
+pub(crate) const END_WEIGHT: f64 = 1.0 / 30.0;
 
 /// The part of a defect of values of a size that is beyond their round-off.
 pub(crate) fn beyond_rounding(defect: f64, size: f64) -> f64 {

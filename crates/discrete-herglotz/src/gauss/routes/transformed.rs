@@ -131,8 +131,7 @@ impl<'a> TransformedStepper<'a> {
     /// start of the last step is not known.
     pub(crate) fn sample_defect(&self, sets: usize) -> Option<DefectSample> {
         let curve = self.run.curve(&*self.system)?;
-        let at = |set| self.system.sample_defect(Instructions::new(), &curve, true, set);
-        (0..sets).map(at).reduce(DefectSample::and)
+        self.system.defect_of(Instructions::new(), &curve, true, sets)
     }
 }
 

@@ -21,8 +21,7 @@ impl GaussSteps {
         Self::momenta(self.mass.as_ref(), &step.from.y, &mut p);
         let mut curve = Curve::new(self.s, step.t, self.h, &step.from.q, &p, step.from.z);
         self.route.collect(system, &step, &mut curve);
-        let at = |set| system.sample_defect(self.arch, &curve, false, set);
-        (0..sets).map(at).reduce(DefectSample::and)
+        system.defect_of(self.arch, &curve, false, sets)
     }
 
     /// Updates the sequence of mean velocities after a step. For few stages a defect of the sequence above one flags a

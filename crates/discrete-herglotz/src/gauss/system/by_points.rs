@@ -53,6 +53,10 @@ impl SystemAtPoints for ByPoints<'_> {
         self.system.hints().forced
     }
 
+    fn has_cones(&self) -> bool {
+        self.system.has_cones()
+    }
+
     fn value(&self, t: f64, x: PointRef<'_>) -> f64 {
         self.system.value(t, &point(x))
     }

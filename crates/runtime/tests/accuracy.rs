@@ -1,0 +1,50 @@
+//! Motions by accuracy of which two trial runs may agree although both are wrong.
+
+use herglotz_runtime::{Motion, Outcome, Start, Status, StepControl, Steps, System};
+
+fn accurate(error: f64) -> StepControl {
+    StepControl::Accuracy { error, by: None }
+}
+
+fn run(system: &System, start: ([f64; 2], [f64; 2]), t_end: f64, control: StepControl) -> Outcome {
+    let outcome = system.run(&Motion::new(Start::new(0.0, start.0, start.1, 0.0), t_end, control), &mut ()).unwrap();
+    assert_eq!(outcome.status, Status::Completed);
+    outcome
+}
+
+/// A motion in a plane along a line through the tip of a norm is that of `abs` along the line, whose kinks are known.
+#[test]
+fn a_motion_through_the_tip_of_a_norm() {
+    // A well with a cone, and a spring that is pushed through its anchor.
+    for (of_distance, q, v) in [("-1/(r + 1)", 1.0, 0.0), ("(r - 1)^2/2", 1.6, -1.6)] {
+        let line = System::parse(&format!("x'^2/2 - ({})", of_distance.replace('r', "abs(x)")), &["x"], &[]).unwrap();
+        let motion = Motion::new(Start::new(0.0, [q], [v], 0.0), 10.0, accurate(1e-12));
+        let exact = line.run(&motion, &mut ()).unwrap().q[0];
+        for norm in ["hypot(x, y)", "sqrt(x^2 + y^2)"] {
+            let l = format!("(x'^2 + y'^2)/2 - ({})", of_distance.replace('r', norm));
+            let system = System::parse(&l, &["x", "y"], &[]).unwrap();
+            for [c, s] in [[1.0, 0.0], [0.6, 0.8]] {
+                let end = run(&system, ([c * q, s * q], [c * v, s * v]), 10.0, accurate(1e-6));
+                let apart = (end.q[0] - c * exact).hypot(end.q[1] - s * exact);
+                // The accuracy is relative to the size of (q, p), which is about one.
+                assert!(apart <= 2e-6, "{l}, {c}: {apart:e}");
+            }
+        }
+    }
+}
+
+/// `x = 1 - t - t^2/2` until it vanishes at `t = sqrt(3) - 1`, with the opposite force beyond.
+#[test]
+fn divided_steps_see_a_kink_beyond_their_outermost_samples() {
+    let system = System::parse("(x'^2 + y'^2)/2 - hypot(x, y)", &["x", "y"], &[]).unwrap();
+    for max_defect in [1e-4, 1e-6, 1e-8, 1e-10] {
+        let by = format!("divided_gauss_8_{max_defect:e}").parse().unwrap();
+        for steps in 4..12 {
+            let control = StepControl::Steps { by, steps: Steps::Count(steps) };
+            let end = run(&system, ([1.0, 0.0], [-1.0, 0.0]), 2.0, control);
+            // A part that contains the kink has an error of the size of its defect.
+            let error = (end.v.as_ref().unwrap()[0] - (3.0 - 2.0 * f64::sqrt(3.0))).abs();
+            assert!(error <= 4.0 * max_defect, "{steps} steps, {max_defect:e}: {error:e}");
+        }
+    }
+}
