@@ -4,6 +4,7 @@
 #![allow(missing_docs, clippy::panic, clippy::unwrap_used)]
 
 mod accuracy;
+mod cones;
 mod constraints;
 mod derivatives;
 mod forces;
