@@ -138,6 +138,8 @@ impl System for Guarded<'_> {
     }
     fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
         self.checked(|| self.system.break_rates(parameter), |_| true, || None)
+    }
+
     fn has_cones(&self) -> bool {
         self.checked(|| self.system.has_cones(), |_| true, || false)
     }

@@ -276,6 +276,8 @@ pub trait System {
     fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
         let _ = parameter;
         None
+    }
+
     /// Whether L or the applied force contains a norm, or another root, that may vanish along the motion, where its
     /// derivative jumps; see [`has_cones`](contact_geom::Lagrangian::has_cones).
     fn has_cones(&self) -> bool {

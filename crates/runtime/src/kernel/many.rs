@@ -91,6 +91,8 @@ impl System for ManyCoordinates {
     }
     fn break_rates(&self, parameter: usize) -> Option<Vec<BreakRate>> {
         Some(self.0.break_rates(parameter))
+    }
+
     fn has_cones(&self) -> bool {
         self.0.has_cones()
     }
