@@ -1,5 +1,7 @@
 //! Motions by accuracy of which two trial runs may agree although both are wrong.
 
+#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+
 use herglotz_runtime::{Motion, Outcome, Start, Status, StepControl, Steps, System};
 
 fn accurate(error: f64) -> StepControl {

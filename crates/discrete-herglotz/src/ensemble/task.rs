@@ -104,6 +104,11 @@ impl<'e> Task<'e> {
         Ok(task)
     }
 
+    /// Whether so many motions of one Lagrangian take less time by runs of their own than in lanes.
+    fn has_few(&self, count: usize) -> bool {
+        self.members.batch_kernel().is_some_and(|kernel| count < kernel.fewest())
+    }
+
     /// The kernels for the Lagrangian of a member, whose constants are read at a state.
     pub(crate) fn kernels_of(&self, index: usize, state: Option<&State>) -> LaneKernels<'e> {
         let (h, steps) = self.plan;
@@ -167,9 +172,8 @@ impl<'e> Task<'e> {
         let Some(first) = starts.first().map(|start| start.0) else { return 0 };
         let mut own = None;
         let [kernel, finer] = self.kernels.as_ref().unwrap_or_else(|| {
-            let few = self.members.batch_kernel().is_some_and(|kernel| starts.len() < kernel.fewest());
-            let state = starts.iter().find_map(|(_, _, state)| state.as_ref().filter(|_| !few));
-            own.insert(self.kernels_of(first, state))
+            let state = starts.iter().find_map(|(_, _, state)| state.as_ref());
+            own.insert(self.kernels_of(first, state.filter(|_| !self.has_few(starts.len()))))
         });
         let mut done = [false; MEMBERS_PER_SHARD];
         let (kernel, finer) = (kernel.as_deref(), finer.as_deref());

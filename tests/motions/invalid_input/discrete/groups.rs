@@ -8,8 +8,8 @@ use contact_geom::nalgebra::SVector;
 use contact_geom::{ChartVector, numbers::MaxAbsOrNan};
 use discrete_herglotz::SplittingScheme;
 use discrete_herglotz::groups::{
-    DenseGroupMotion, GroupDerivatives, GroupEnds, GroupGauss, GroupIntegrator, GroupMotion, GroupRows, GroupRun,
-    GroupState, RigidBodySplitting, group_steps,
+    DenseGroupMotion, GroupBreaks, GroupDerivatives, GroupEnds, GroupGauss, GroupIntegrator, GroupMotion, GroupRows,
+    GroupRun, GroupState, RigidBodySplitting, group_steps,
 };
 
 pub const TESTS: &[InputTest] = &[
@@ -30,6 +30,7 @@ pub const TESTS: &[InputTest] = &[
             "DenseGroupMotion::at",
             "DenseGroupMotion::new",
             "DenseGroupMotion::span",
+            "GroupBreaks::new",
             "GroupDerivatives::contact_defect",
             "GroupDerivatives::gradients",
             "GroupDerivatives::new",
@@ -178,6 +179,12 @@ fn runs(report: &mut Report) {
             let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(c), 3);
             report.entry_point(&c.to_vec(), dense.and_then(|dense| numbers_of(&dense.at(0.07)?)));
         }
+        let divided = GroupBreaks::new(gauss.clone(), vec![0.15, value]).and_then(|by| {
+            let mut motion = GroupMotion::new(0.0, start(GOOD))?;
+            motion.advance(&by, 3)?;
+            numbers_of(&motion.state())
+        });
+        report.entry_point(&value, divided);
         let found = GroupDerivatives::new(&gauss, value, &start(GOOD), 3);
         report.entry_point(&value, found.map(|found| found.in_start.iter().copied().collect::<Vec<_>>()));
         let dense = DenseGroupMotion::new(gauss.clone(), value, &start(GOOD), 3);

@@ -179,8 +179,11 @@ fn step_errors() {
             Switching::Reset.fails()
         }, ["the reset at t = ", "the other side of its own surface", "assign a state"];
         StepError::Accumulation { .. } => {
+            Impacting(Impact::Restitution(0.3)).fails()
+        }, ["accumulate at t = ", "the motion continues"];
+        StepError::Contact { .. } => {
             Impacting(Impact::Restitution(0.0)).fails()
-        }, ["accumulate at t = 1", "how the motion continues"];
+        }, ["rests at t = 1", "pressed onto it", "end the run before it"];
         StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
             let ld = Rule::RECTANGLE.of(Kepler::<2>::default(), 0.1).unwrap();
