@@ -39,7 +39,7 @@ pub trait StepDetails {
         &[]
     }
 
-    /// Whether a reset so far was not conformally contact, so that the energy changed by an unknown amount.
+    /// Whether a reset so far changed the energy, so that its drift says nothing of the steps.
     fn has_changed_energy(&self) -> bool {
         false
     }

@@ -20,7 +20,7 @@ pub(super) struct Passed {
 /// The time for which a motion that is pushed onto a surface is followed beyond it, as a fraction of a step.
 const PUSHED_TIME: f64 = 1e-3;
 
-/// The relative change of the energy, beyond that by the conformal factor, above which it is none by round-off.
+/// The relative change of the energy above which it is none by round-off.
 const MAX_ENERGY_CHANGE: f64 = 1e-12;
 
 /// The energy `v . L_v - L` at a point, and the size of its terms.
@@ -137,12 +137,10 @@ impl SwitchingStepper<'_> {
         }
         let next = departure.map(|departure| departure.side).or(stays.then_some(side));
         self.surfaces.reset(&*system, (index, next), t, [&from, &to], self.h);
-        // The energy grows by the factor, unless the surface moves or the law of the reset changes it.
-        let grown = |factor: f64| {
-            let [(before, size), (after, size_after)] = [&from, &to].map(|x| energy(&*system, t, x));
-            (after - factor * before).abs() <= MAX_ENERGY_CHANGE * (size + size_after)
-        };
-        self.changed_energy |= !factor.is_some_and(grown);
+        // On a surface that moves, or by a conformal factor, a contact transformation changes the energy too.
+        let [(before, size), (after, size_after)] = [&from, &to].map(|x| energy(&*system, t, x));
+        let keeps = (after - before).abs() <= MAX_ENERGY_CHANGE * (size + size_after);
+        self.changed_energy |= factor.is_none() || !keeps;
         self.resets.push(Reset { t, index, before: at.state, after: state.clone() });
         let rests = StepStart::zeros(to.v.len());
         Ok((TimedState { t, state, v: to.v, rests }, passage))
