@@ -177,6 +177,33 @@ fn steps_with_constraints_are_contact() {
     }
 }
 
+/// Short steps and slow motions: the velocities of the stages have the round-off of the positions, divided by the step.
+#[test]
+fn short_steps_and_slow_motions_converge() {
+    // The amplitude, the stages, the step, the span and the drag.
+    for (amplitude, stages, h, end, gamma) in [
+        (0.01_f64, 4, 0.001_f64, 1.0_f64, 0.0),
+        (1.0, 4, 1e-4, 0.1, 0.0),
+        (1.0, 7, 1e-3, 0.5, 0.0),
+        (1.0, 2, 0.001, 1.0, 0.0),
+        (0.5, 4, 0.1, 2000.0, -0.1),
+        (0.5, 6, 0.05, 400.0, -0.2),
+    ] {
+        let system = pendulum(NEWTON).with_parameters(&[("gamma", gamma)]).unwrap();
+        let start = Start::new(0.0, [amplitude.sin(), -amplitude.cos()], [0.0, 0.0], 0.0);
+        let step_control = named(&format!("gauss_{stages}"), (end / h).round() as usize);
+        let found = system.run(&Motion::new(start, end, step_control), &mut ()).unwrap();
+        assert_eq!(found.status, Status::Completed, "gauss_{stages} with {h} from {amplitude}");
+        let angle = Formula::parse("u'^2/2 + cos(u)*9.81 + gamma*z", &["u"], &[("gamma", gamma)]).unwrap();
+        let accurate = StepControl::Accuracy { error: 1e-12, by: None };
+        let motion = Motion::new(Start::new(0.0, [amplitude], [0.0], 0.0), end, accurate);
+        let expected = System::new(&angle).unwrap().run(&motion, &mut ()).unwrap().q[0];
+        // Round-off of the steps, which adds up to eps q for each, and the truncation of the longest ones.
+        let apart = (found.q[0] - expected.sin()).abs();
+        assert!(apart < 1e-8, "gauss_{stages} with {h} from {amplitude}: {apart:e}");
+    }
+}
+
 /// A force under constraints, of time, positions, velocities and the action: the motion is that of the pendulum in its
 /// angle, and the order of collocation remains.
 #[test]
