@@ -13,6 +13,7 @@ use crate::invalid_input::{Exceptions, InputTest};
 
 pub const EXCEPTIONS: Exceptions = &[
     ("Lagrangian::closed_*", "the implementor's, and nothing by default"),
+    ("Lagrangian::has_cones", "takes no number"),
     ("Lagrangian::switching_functions", "the implementor's, and none by default"),
     ("Lagrangian::structure", "the implementor's, and takes no number"),
     ("ContactHamiltonian::*", "the implementor's"),
