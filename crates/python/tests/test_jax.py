@@ -129,8 +129,9 @@ def test_invalid_input():
         hj.solve(L, [1.0], [1.0], 1.0, parameters={"gamma": -0.1, "gama": 1.0}, **GIVEN)
     with pytest.raises(ValueError, match="they must be"):
         hj.solve("pendulum", [1.0], [1.0, 2.0], 1.0)
-    with pytest.raises(ValueError, match="`events` cannot be given here"):
-        hj.solve("pendulum", [1.0], [1.0], 1.0, events="theta")
+    terminal = hz.Event("theta", terminal=True)
+    with pytest.raises(Exception, match="terminal event"):
+        jax.grad(lambda x: hj.solve("pendulum", [x], [1.0], 1.0, events=terminal).q[-1, 0])(1.0)
     with pytest.raises(Exception, match="not completed"):
         hj.solve("x'^2/2 + 1/x", [1.0], [0.0], 5.0, coordinates=["x"], integrator="gauss_4", steps=50).q.block_until_ready()
     assert hz.solve("pendulum", t=1.0).success

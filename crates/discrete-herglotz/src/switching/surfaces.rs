@@ -377,10 +377,10 @@ impl Surfaces {
     fn is_left_to_next(&mut self, system: &dyn System, curve: &StepCurve, index: usize, samples: &Samples) -> bool {
         let (side, to) = (self.side(index), (curve.to.t, &curve.to.argument(system)));
         let rounding = self.rounding(system, index, to, 0.0);
-        // Written so that a NaN is beyond. An end that is off the surface says nothing of what is between the samples.
+        // Written so that a NaN is beyond. A curve with both ends off the surface may go beyond it between the samples.
         let within = samples.values().iter().all(|value| side * value >= -rounding);
-        let ends_on = samples.ends()[1].abs() <= rounding;
-        within && ends_on && has_reset(system, index, to, side < 0.0)
+        let starts_or_ends_on = samples.ends().iter().any(|value| value.abs() <= rounding);
+        within && starts_or_ends_on && has_reset(system, index, to, side < 0.0)
     }
 
     /// The side of a function with the fraction of the step from which it has one, and the fractions between which it
