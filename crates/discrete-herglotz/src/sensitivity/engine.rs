@@ -141,15 +141,21 @@ impl<'a> Engine<'a> {
             if self.is_part {
                 // A part may be so short that the state changes by its round-off: the changes are those by the rates.
                 let (v, force) = (&at.v[..n], &step.force[..n]);
-                let change = |rates: &Stages| stage_values::<S>(&self.forward, rates, 0.0);
+                let forward = &self.forward;
                 for d in 0..n {
-                    let (of_q, of_p) = (change(&v[d]), change(&force[d]));
-                    given_q[d] = of_q.map(|x| q[d] + fraction * x);
-                    given_p[d] = of_p.map(|x| p[d] + fraction * x);
+                    let of_q = stage_values::<S>(forward, &v[d], 0.0);
+                    let of_p = stage_values::<S>(forward, &force[d], 0.0);
+                    for i in 0..MAX_STAGES {
+                        given_q[d].0[i] = q[d] + fraction * of_q.0[i];
+                        given_p[d].0[i] = p[d] + fraction * of_p.0[i];
+                    }
                 }
-                let of_z = change(&at.l);
-                given.z = of_z.map(|x| column.z + fraction * x);
-                given.r = change(&step.rate).map(|fallen| -fraction * fallen);
+                let of_z = stage_values::<S>(forward, &at.l, 0.0);
+                let fallen = stage_values::<S>(forward, &step.rate, 0.0);
+                for i in 0..MAX_STAGES {
+                    given.z.0[i] = column.z + fraction * of_z.0[i];
+                    given.r.0[i] = -fraction * fallen.0[i];
+                }
             } else {
                 for i in 0..s {
                     for d in 0..n {
