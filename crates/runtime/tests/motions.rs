@@ -44,9 +44,9 @@ fn start_of(entry: &CatalogueEntry) -> Start {
 
 /// Records of a motion.
 #[derive(Default)]
-struct Seen {
-    rows: Vec<Vec<f64>>,
-    crossings: Vec<Crossing>,
+pub struct Seen {
+    pub rows: Vec<Vec<f64>>,
+    pub crossings: Vec<Crossing>,
     nodes: usize,
     /// The number of polls after which the motion is ended.
     polls: Option<usize>,

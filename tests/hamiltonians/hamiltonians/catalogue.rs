@@ -21,7 +21,7 @@ fn compare<L: Lagrangian<N> + From<S>, S: System<N>, const N: usize>(
     let by_lagrangian = Problem::new(&lagrangian, t, x).unwrap();
     let by_hamiltonian = Problem::of_hamiltonian(&of, t, legendre(&lagrangian, t, &x)).unwrap();
     // The steppers alone: whole runs of so many types would take long to compile.
-    let options = StepperOptions { action: true, check_resolution: false, parts: false };
+    let options = StepperOptions { action: true, check_resolution: false, ..StepperOptions::default() };
     let mut a = GaussStepper::new(&by_lagrangian, 8, 1.0 / 128.0, options).unwrap();
     let mut b = GaussStepper::new(&by_hamiltonian, 8, 1.0 / 128.0, options).unwrap();
     a.advance(256).unwrap();

@@ -12,7 +12,7 @@ use discrete_herglotz::{GaussCollocation, InputError, Integrator, Problem, Split
 /// The states after consecutive steps of a method on a motion of the catalogue.
 fn states(system: &OneCoordinate, start: VelocityPoint<1>, h: f64, steps: usize) -> (Vec<PhasePoint<1>>, f64) {
     let problem = Problem::new(system, 0.0, start).unwrap();
-    let options = StepperOptions { action: true, check_resolution: false, parts: false };
+    let options = StepperOptions { action: true, check_resolution: false, ..StepperOptions::default() };
     let mut stepper = SplittingScheme::STRANG.stepper(&problem, h, options).unwrap();
     let mut states = vec![stepper.state().fixed()];
     for _ in 0..steps {

@@ -108,7 +108,7 @@ fn a_force_acts_on_a_hamiltonian_motion() {
     let x = VelocityPoint::new([1.0], [0.5], 0.2);
     let by_lagrangian = Line::from(Forced::new(pendulum, Push));
     let by_hamiltonian = Forced::new(OfHamiltonian(One::Of(pendulum.into())), Push);
-    let options = StepperOptions { action: true, check_resolution: false, parts: false };
+    let options = StepperOptions { action: true, check_resolution: false, ..StepperOptions::default() };
     let a = Problem::new(&by_lagrangian, 0.0, x).unwrap();
     let mut a = GaussStepper::new(&a, 8, 0.1, options).unwrap();
     a.advance(50).unwrap();

@@ -38,7 +38,11 @@ fn distance<'a, L: Lagrangian<N> + Sync, I: Integrator<'a, L, N> + Sync + Copy +
             let problem = Problem::new(lagrangian, 0.0, start(member.index)).unwrap();
             let h = 5.0 / steps as f64;
             let mut own = integrator
-                .stepper(&problem, h, StepperOptions { action: true, check_resolution: false, parts: false })
+                .stepper(
+                    &problem,
+                    h,
+                    StepperOptions { action: true, check_resolution: false, ..StepperOptions::default() },
+                )
                 .unwrap();
             own.advance(steps).unwrap();
             let ending = member.ending.as_ref().unwrap();

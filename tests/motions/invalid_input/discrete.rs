@@ -96,7 +96,6 @@ pub const EXCEPTIONS: Exceptions = &[
     ("GroupBreaks::divides", "takes a time and a length that are those of steps"),
     ("GroupBreaks::integrator", "takes no number"),
     ("ParametricGroupIntegrator::*", "the integrators'; crates/discrete-herglotz/tests/groups"),
-    ("Integrator::undivided_stepper", "calls Integrator::stepper"),
     ("Integrator::step_variation", "crates/discrete-herglotz/tests/constraints/derivatives"),
     ("DiscretizationMethod::step_jacobian", "tests/derivatives/discrete_tangents"),
     ("Integrator::step_formula", "takes no number"),

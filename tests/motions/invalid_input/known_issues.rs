@@ -169,7 +169,7 @@ fn a_momentum_ends_a_run_whose_positions_continue() {
     }
     let hamiltonian = OfHamiltonian(VanDerPol);
     let problem = Problem::of_hamiltonian(&hamiltonian, 0.0, PhasePoint::new([2.0], [0.0], 0.0)).unwrap();
-    let options = StepperOptions { action: true, check_resolution: false, parts: false };
+    let options = StepperOptions { action: true, check_resolution: false, ..StepperOptions::default() };
     let mut stepper = GaussStepper::new(&problem, 8, 0.01, options).unwrap();
     let failure = stepper.advance(2000).unwrap_err();
     let state = stepper.state();

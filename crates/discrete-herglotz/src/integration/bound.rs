@@ -20,15 +20,6 @@ pub(crate) trait BoundIntegrator<'a> {
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError>;
 
-    fn undivided_stepper(
-        &self,
-        problem: &SystemProblem<'a>,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
-        self.stepper(problem, h, options)
-    }
-
     fn constraint_force(&self, _t: f64, x: &Point) -> Result<Vector, StepError> {
         Ok(Vector::zeros(x.q.len()))
     }
@@ -95,15 +86,6 @@ where
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         self.integrator.stepper(&problem.of(self.lagrangian), h, options)
-    }
-
-    fn undivided_stepper(
-        &self,
-        problem: &SystemProblem<'a>,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
-        self.integrator.undivided_stepper(&problem.of(self.lagrangian), h, options)
     }
 
     fn constraint_force(&self, t: f64, x: &Point) -> Result<Vector, StepError> {

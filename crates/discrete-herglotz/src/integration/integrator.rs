@@ -76,6 +76,9 @@ pub struct StepperOptions {
     /// Whether the stages of the parts of divided steps are kept, for
     /// [`StepDetails::solved_parts`](crate::StepDetails::solved_parts).
     pub parts: bool,
+    /// Whether the steps are known to need no division: they are parts of steps of an integrator that
+    /// [divides](MethodInfo::divides) its steps.
+    pub undivided: bool,
 }
 
 /// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of
@@ -104,20 +107,6 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError>;
-
-    /// The same for steps that are known to need no division: parts of steps, for an integrator that
-    /// [divides](MethodInfo::divides) its steps. By default it is [`stepper`](Self::stepper).
-    ///
-    /// # Errors
-    /// Those of [`stepper`](Self::stepper).
-    fn undivided_stepper(
-        &self,
-        problem: &Problem<'a, L, N>,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
-        self.stepper(problem, h, options)
-    }
 
     /// The force of the constraints, `G^T lambda` or `omega^T mu`, at a point of the motion, for an integrator that is
     /// [constrained](MethodInfo::constrained). The default is 0.

@@ -96,7 +96,7 @@ impl<'p> Discretization<'p> {
 
     fn options(&self, check_resolution: bool) -> StepperOptions {
         let OutputRequest { action, derivatives, .. } = self.needs;
-        StepperOptions { action, check_resolution, parts: derivatives }
+        StepperOptions { action, check_resolution, parts: derivatives, undivided: false }
     }
 
     /// A stepper that starts at a state with its velocity and has taken steps of size h: a given number of them, or
@@ -185,7 +185,9 @@ impl<'p> Discretization<'p> {
         let (t0, start) = step.start();
         let at_start = self.velocity(t0, start, Some(&step.velocity()))?;
         let make = |problem: &SystemProblem<'p>, h: f64| match step {
-            WholeStep::Collocation(_) => self.integrator.undivided_stepper(problem, h, self.options(false)),
+            WholeStep::Collocation(_) => {
+                self.integrator.stepper(problem, h, StepperOptions { undivided: true, ..self.options(false) })
+            }
             WholeStep::Flow(_) => self.stepper_of(problem, h, false),
         };
         let stepper = self.advanced_by(&make, (t0, start), &at_start, t - t0, (1, t), |_| ())?;

@@ -150,18 +150,9 @@ impl<'a> BoundIntegrator<'a> for ByPoints {
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
-        Ok(match self.divided {
+        Ok(match self.divided.filter(|_| !options.undivided) {
             Some(divided) => Box::new(divided.run(Arc::new(CollocationByPoints), problem, h, options)?),
-            None => return self.undivided_stepper(problem, h, options),
+            None => Box::new(GaussStepper::by_points(problem, self.stages, h, options)?),
         })
-    }
-
-    fn undivided_stepper(
-        &self,
-        problem: &SystemProblem<'a>,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
-        Ok(Box::new(GaussStepper::by_points(problem, self.stages, h, options)?))
     }
 }

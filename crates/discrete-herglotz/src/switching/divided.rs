@@ -81,15 +81,9 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        if options.undivided {
+            return GaussCollocation { stages: self.stages }.stepper(problem, h, options);
+        }
         Ok(Box::new(self.run(Arc::new(CollocationOf(problem.lagrangian)), &problem.of_system(), h, options)?))
-    }
-
-    fn undivided_stepper(
-        &self,
-        problem: &Problem<'a, L, N>,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Box<dyn Stepper + 'a>, InputError> {
-        GaussCollocation { stages: self.stages }.stepper(problem, h, options)
     }
 }

@@ -234,7 +234,7 @@ def warn_of_gain(of, q, rate=None, z=0.0, t=0.0, values=None):
         at = float(t), np.ravel(q), np.ravel(rate), float(z)
         found = (_core.hamiltonian_geometry if of.kind[0] else _core.geometry)(of, at)["rate"]
     except (TypeError, ValueError):
-        # What is wrong with the arguments is said elsewhere, and without a geometry there is no rate.
+        # Wrong arguments are refused by the function that was called. Where the geometry is not defined, L_z is not known.
         return
     if found > 0:
         name = "-H_z" if of.kind[0] else "L_z"

@@ -4,9 +4,10 @@ use super::feature::Feature;
 use super::problem::{Form, Problem};
 use super::random::Random;
 use super::reference::{Reference, motion};
+use crate::motions::Seen;
 use herglotz_runtime::{
-    Column, Crossing, Ensemble, Event, InitialVelocity, MemberEnd, MotionFit, Outcome, OutputTimes, RunMonitor, Series,
-    Start, Status, StepControl, System, Unknown, Varied,
+    Column, Ensemble, Event, InitialVelocity, MemberEnd, MotionFit, Outcome, OutputTimes, Series, Start, Status,
+    StepControl, System, Unknown, Varied,
 };
 use std::ops::ControlFlow;
 
@@ -173,24 +174,6 @@ fn end(problem: &Problem, system: &System, truth: &Reference, bound: f64) -> Res
     let outcome = accepted(refused(system.run(&problem.motion(system), &mut ()))?)?;
     let [x, v, z] = problem.observed(truth.end);
     differ("end", &state_of(problem, &outcome), &[x, v, z, truth.t], bound)
-}
-
-/// Keeps rows and crossings.
-#[derive(Default)]
-struct Seen {
-    rows: Vec<Vec<f64>>,
-    crossings: Vec<Crossing>,
-}
-
-impl RunMonitor for Seen {
-    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
-        self.rows.push(numbers.to_vec());
-        ControlFlow::Continue(())
-    }
-    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
-        self.crossings.push(crossing.clone());
-        ControlFlow::Continue(())
-    }
 }
 
 fn columns(problem: &Problem, system: &System) -> Vec<Column> {

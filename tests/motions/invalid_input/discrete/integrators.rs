@@ -100,7 +100,10 @@ fn integrators(report: &mut Report) {
         report.check(same || !constant_rate, || format!("{}: another rate", info.name));
     }
     let rule = Rule::MIDPOINT;
-    for options in [StepperOptions::default(), StepperOptions { action: true, check_resolution: true, parts: false }] {
+    for options in [
+        StepperOptions::default(),
+        StepperOptions { action: true, check_resolution: true, ..StepperOptions::default() },
+    ] {
         one(report, &rule, options);
         one(report, &CompositionMethod::new(rule, SplittingScheme::YOSHIDA_4), options);
         for by in BY.into_iter().flatten() {
@@ -140,7 +143,7 @@ fn saved(report: &mut Report) {
                 &by,
                 &tame(),
                 0.1,
-                StepperOptions { action: true, check_resolution: true, parts: false },
+                StepperOptions { action: true, check_resolution: true, ..StepperOptions::default() },
             )
             .unwrap()
         };

@@ -122,7 +122,7 @@ fn a_state_saved_during_simplified_newton_iteration_is_restored() {
     let system = SphericalPendulum::default();
     let problem = Problem::new(&system, 0.0, system.initial()).unwrap();
     for (stages, h) in [(1, 0.4), (2, 1.5), (8, 1.5)] {
-        let options = StepperOptions { action: true, check_resolution: true, parts: false };
+        let options = StepperOptions { action: true, check_resolution: true, ..StepperOptions::default() };
         let new = || GaussStepper::new(&problem, stages, h, options).unwrap();
         let (mut run, mut by_newton) = (new(), 0);
         for _ in 0..30 {
