@@ -46,7 +46,7 @@ def system(
     H : function or str, optional
         In place of `L`, a contact Hamiltonian: ``H(t, q, p, z)``, or a formula in the coordinates ``x`` and the momenta
         ``p_x``. Its motions satisfy q' = H_p, p' = -H_q - p H_z, z' = p.H_p - H; H_pp may be singular. It has up to 4
-        coordinates, and no forces and breaks.
+        coordinates, and no forces and resets.
     momenta : list of str, optional
         The names of the momenta of `H` in formulas, in the order of the coordinates.
     action : str, optional
