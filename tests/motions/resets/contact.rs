@@ -130,3 +130,27 @@ fn the_flow_through_an_impact_is_conformally_contact() {
         }
     }
 }
+
+/// A slow impact where the potential is high has a state, although the round-off of its energy is larger than that of its
+/// velocity.
+#[test]
+fn a_slow_impact_in_a_high_potential_has_a_state() {
+    struct High(f64);
+    impl Lagrangian<1> for High {
+        fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {
+            v[0] * v[0] * 0.65 - q[0].cos() * self.0
+        }
+    }
+    let mut draws = Draws::of(17);
+    for _ in 0..2000 {
+        let height = 10.0_f64.powf(draws.between(-1.0, 6.0));
+        let (wall, approach) = (draws.between(-1.0, 1.0), -(10.0_f64.powf(draws.between(-3.0, 0.0))));
+        let x = VelocityPoint::new([draws.between(0.0, 1.0)], [wall + approach], 0.0);
+        let y = Impact::Elastic.after(&High(height), 0.0, &x, (&SVector::from([1.0]), -wall)).unwrap();
+        // The round-off of the energies, and of the impulse that moves with the wall, over the slope of the energy.
+        let (of_energy, slope) =
+            (2.0 * (height + 2.0 * x.v[0].powi(2)) + 2.6 * (approach * wall).abs(), 1.3 * approach);
+        let bound = 8.0 * f64::EPSILON * (x.v[0].abs() + wall.abs() + of_energy / slope.abs());
+        assert!((y.v[0] - (wall - approach)).abs() <= bound, "{height} {wall} {approach}: {}", y.v[0]);
+    }
+}

@@ -189,20 +189,27 @@ impl Impact {
             let (value, momentum, w) = at(&y, z);
             let residual = &momentum - &p * factor - normal * mu;
             let (along, across) = (divided(&w, &residual)?, divided(&w, normal)?);
+            // The terms of the law, its derivative in the velocity, and that in mu.
             let (of_law, direction, of_mu) = if by_energy {
-                (y.dot(&momentum) - value - energy * factor + mu * rate, w * &y, rate)
+                ([y.dot(&momentum), -value, -energy * factor, mu * rate], w * &y, rate)
             } else {
-                (normal.dot(&y) + rate + approach * restitution, normal.clone(), T::zero())
+                ([normal.dot(&y), rate, approach * restitution, T::zero()], normal.clone(), T::zero())
             };
-            let change = (direction.dot(&along) - of_law) / (direction.dot(&across) + of_mu);
+            let sum = of_law.iter().fold(T::zero(), |sum, term| sum + *term);
+            let slope = direction.dot(&across) + of_mu;
+            let change = (direction.dot(&along) - sum) / slope;
+            let largest = |v: &OVector<T, D>| v.iter().fold(0.0, |m: f64, v| m.max(v.pivot_size()));
+            // A slow motion in a high potential has an energy whose round-off is larger than that of its velocity.
+            let terms: f64 = of_law.iter().map(|term| term.pivot_size()).sum();
+            let of_terms = terms * largest(&across) / slope.pivot_size();
             let step = across * change - along;
             mu += change;
             y += &step;
-            let [size, of] = [&step, &y].map(|v| v.iter().fold(0.0, |m: f64, v| m.max(v.pivot_size())));
+            let (size, of) = (largest(&step), largest(&y));
             if !(size.is_finite() && mu.extent().is_finite()) {
                 return None;
             }
-            if size <= f64::EPSILON * of || size >= last && size <= 64.0 * f64::EPSILON * of {
+            if size <= f64::EPSILON * of || size >= last && size <= 64.0 * f64::EPSILON * of.max(of_terms) {
                 converged += 1;
             }
             if converged == MAX_EXTRA_ITERATIONS {

@@ -178,8 +178,10 @@ impl Surfaces {
             }
             let tolerance = self.rounding(system, index, (t, x), h);
             let Some(Departure { side, .. }) = self.departure(system, index, (t, x), h, tolerance) else { continue };
-            let resets =
-                self.is_on_without_motion(system, index, (t, x)) && has_reset(system, index, (t, x), side > 0.0);
+            // A run that ended here has made the reset only if its end was beyond the surface by more than the round-off
+            // of its own numbers.
+            let is_ahead = side * value < 0.0 || self.is_on_without_motion(system, index, (t, x));
+            let resets = is_ahead && has_reset(system, index, (t, x), side > 0.0);
             if let Some(of) = self.sides.get_mut(index) {
                 *of = if resets { -side } else { side };
             }

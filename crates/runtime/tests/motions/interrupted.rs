@@ -249,6 +249,26 @@ fn a_reset_between_two_runs_occurs_once() {
     }
 }
 
+/// A motion that starts before the surface of a reset, however closely, has the reset: the run that ended there has not
+/// made it.
+#[test]
+fn a_reset_just_after_the_start_occurs() {
+    let wall = 0.43871965452303385;
+    let free = Formula::parse("x'^2/2", &["x"], &[("a", wall)]).unwrap();
+    let bounce = free.with_impact("x - a", Impact::Elastic, None).unwrap();
+    let bits = f64::to_bits(wall);
+    for ulps in (0..80).chain([100, 150, 1000, 100_000]) {
+        let x = f64::from_bits(bits + ulps);
+        let start = || Start::new(0.0, [x], [-1.4587765806592556], 0.0);
+        for by in [by_steps(2, 0.01), by_steps(4, 0.5), by_steps(8, 3.0), accurate(1e-9)] {
+            let (outcome, resets) = with_resets(&bounce, start(), 3.0, by);
+            let bounced = 2.0 * wall - x + 3.0 * 1.4587765806592556;
+            // The round-off of 300 steps.
+            assert!(resets == 1 && (outcome.q[0] - bounced).abs() <= 1e-12, "{ulps} ulps by {by:?}: {outcome:?}");
+        }
+    }
+}
+
 /// A body that comes to rest on the surface of a reset, and is pressed onto it, does not pass through: the run ends there
 /// with a status that says so.
 #[test]
