@@ -6,6 +6,8 @@
 mod catalogue;
 #[path = "motions/constraints.rs"]
 mod constraints;
+#[path = "motions/corners.rs"]
+mod corners;
 #[path = "motions/dimensions.rs"]
 mod dimensions;
 #[path = "motions/ensembles.rs"]

@@ -50,7 +50,7 @@ impl From<Passage> for PieceStart {
         match passage {
             Passage::Continuous => PieceStart::Zero,
             Passage::Refraction | Passage::Reflection => PieceStart::Jump,
-            Passage::Reset | Passage::Accumulation => PieceStart::Reset,
+            Passage::Reset | Passage::Corner | Passage::Accumulation => PieceStart::Reset,
         }
     }
 }

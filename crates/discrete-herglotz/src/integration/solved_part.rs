@@ -62,6 +62,9 @@ pub enum Passage {
     Continuous,
     /// Its state is replaced.
     Reset,
+    /// Its state is replaced at a corner of the surface, as where `min(x, y)` is zero in both: by the law of one of the parts
+    /// that meet there. Others of them may follow at the same point.
+    Corner,
     /// It crosses a jump of L with another momentum.
     Refraction,
     /// It is reflected at a jump of L.

@@ -83,7 +83,7 @@ impl Switch<'_, '_> {
     /// The normal `g_q` and the rate `g_t` of the surface, at a point that is moved, by differences.
     fn normal(&self, system: &dyn System, t: f64, x: &Point) -> Option<Vec<f64>> {
         let arguments = (0..x.q.len()).map(Argument::Position).chain([Argument::Time]);
-        let normal = arguments.map(|along| difference(along, (t, x), self.h, &|t, x| self.function(system, t, x)));
+        let normal = arguments.map(|along| difference(along, (t, x), self.h, 1.0, &|t, x| self.function(system, t, x)));
         normal.map(|of| of?.first().copied()).collect()
     }
 

@@ -18,6 +18,27 @@ use contact_geom::{Dual, VelocityPoint};
 /// and to a step: half of the digits, since the time of a tangential zero has half of them.
 pub(crate) const MIN_RATE: f64 = 1.5e-8;
 
+/// The distance, relative to a coordinate, within which a passage is at a corner of its surface: some hundred thousand
+/// roundings.
+const CORNER_DISTANCE: f64 = 1e-10;
+
+/// The largest number of halvings of the distances of differences beside a corner of a surface: the derivative keeps seven
+/// digits.
+const MAX_HALVINGS: i32 = 20;
+
+/// The part of the changes of a function by which they differ from those of a smooth one at a kink.
+const MIN_KINK: f64 = 1e-2;
+
+/// The number of roundings of the terms of a function that is no kink.
+const MAX_ROUNDINGS: f64 = 64.0;
+
+/// The part of all positions by which they are changed to find the size of the terms of a function.
+const SIZE_DISTANCE: f64 = 1e-3;
+
+/// Why a passage at a corner has no derivative.
+const AT_CORNER: &str = "it is at a corner of the surface, where motions on its two sides differ; differentiate a run that \
+                         ends before, or with another start";
+
 /// A number with its derivative along one direction.
 pub(super) type Along = Dual<f64, SVector<f64, 1>>;
 
@@ -123,12 +144,46 @@ impl Switch<'_, '_> {
         along: Argument,
         f: impl Fn(&dyn System, f64, &Point) -> Option<Vec<f64>>,
     ) -> Result<Vec<f64>, SensitivityError> {
-        let (problem, t, x) = (self.problem, self.at.t, self.point());
+        let (problem, t, x, part) = (self.problem, self.at.t, self.point(), self.smooth_part(along)?);
         let found = match along {
-            Argument::Parameter(k) => difference_in_parameter(problem, k, &mut |system| f(system, t, &x)),
-            _ => difference(along, (t, &x), self.h, &|t, x| f(problem.system(), t, x)),
+            Argument::Parameter(k) => difference_in_parameter(problem, k, part, &mut |system| f(system, t, &x)),
+            _ => difference(along, (t, &x), self.h, part, &|t, x| f(problem.system(), t, x)),
         };
         found.ok_or_else(|| self.unknown("it cannot be evaluated at nearby states, times and parameters"))
+    }
+
+    /// The part of the distances of differences along an argument within which the surface has no corner.
+    fn smooth_part(&self, along: Argument) -> Result<f64, SensitivityError> {
+        let mut parts = (0..=MAX_HALVINGS).map(|k| f64::powi(0.5, k));
+        let part = parts.find(|part| !self.is_kinked(along, ridders::FIRST_DISTANCE * part));
+        part.ok_or_else(|| self.unknown(AT_CORNER))
+    }
+
+    /// Whether the switching function has a kink within a distance along an argument, relative to its size: its changes
+    /// over this distance and over half of it are not those of a smooth function, up to third order.
+    fn is_kinked(&self, along: Argument, distance: f64) -> bool {
+        let (problem, x, t) = (self.problem, self.point(), self.at.t);
+        let value = |system: &dyn System, t: f64, x: &Point| self.function(system, t, x).map_or(f64::NAN, |g| g[0]);
+        let here = value(problem.system(), t, &x);
+        let moved = |part: f64| match along {
+            Argument::Parameter(k) => {
+                let mut theta = problem.of.parameters();
+                theta[k] += part * distance * scale(theta[k].abs());
+                let of = |system: &dyn System| Some(vec![value(system, t, &x)]);
+                problem.of.with_parameters(&theta, &mut { of }).map_or(f64::NAN, |g| g[0]) - here
+            }
+            _ => {
+                let (t, x) = moved(along, (t, &x), part * distance * scale(size(along, &x, self.h)));
+                value(problem.system(), t, &x) - here
+            }
+        };
+        let [after, before, near_after, near_before] = [1.0, -1.0, 0.5, -0.5].map(moved);
+        let of_even = (after + before - 4.0 * (near_after + near_before)).abs();
+        let of_odd = (after - before - 2.0 * (near_after - near_before)).abs();
+        // The size of the terms of the function: its change with all positions.
+        let grown = Point { q: &x.q * (1.0 + SIZE_DISTANCE) + &x.v * (SIZE_DISTANCE * self.h), ..x.clone() };
+        let terms = (value(problem.system(), t, &grown) - here).abs() / SIZE_DISTANCE;
+        of_even.max(of_odd) > MIN_KINK * (after.abs() + before.abs()) + MAX_ROUNDINGS * f64::EPSILON * terms
     }
 
     /// The value of the switching function at a point.
@@ -192,12 +247,17 @@ impl Switch<'_, '_> {
             Passage::Reset => Ok(Some(PassageDerivatives::Reset(Box::new(self.reset()?)))),
             Passage::Refraction => Ok(Some(PassageDerivatives::Corner(Box::new(self.corner(next, true)?)))),
             Passage::Reflection => Ok(Some(PassageDerivatives::Corner(Box::new(self.corner(next, false)?)))),
+            Passage::Corner => Err(self.unknown(AT_CORNER)),
             Passage::Accumulation => Err(self.unknown("it is the limit of infinitely many resets")),
         }
     }
 
     /// The derivatives of the reset.
     fn reset(&self) -> Result<ResetDerivatives, SensitivityError> {
+        let at_corner = |i: usize| self.is_kinked(Argument::Position(i), CORNER_DISTANCE);
+        if (0..self.problem.dimension()).any(at_corner) {
+            return Err(self.unknown(AT_CORNER));
+        }
         let (problem, t) = (self.problem, self.at.t);
         let images = self.arguments().map(|along| self.state_along(along)).collect::<Result<Vec<_>, _>>()?;
         let before = self.velocity_dependence()?;
@@ -210,42 +270,57 @@ impl Switch<'_, '_> {
     }
 }
 
-/// The derivative of a function of the time and the point along one of them, by differences, for a motion with steps of
-/// length h; `None` along a parameter.
-pub(super) fn difference(
-    along: Argument,
-    (t, x): (f64, &Point),
-    h: f64,
-    f: &dyn Fn(f64, &Point) -> Option<Vec<f64>>,
-) -> Option<Vec<f64>> {
-    let size = match along {
+/// The size of an argument at a point of a motion with steps of length h; that of a parameter is not known.
+fn size(along: Argument, x: &Point, h: f64) -> f64 {
+    match along {
         Argument::Position(i) => max_or_nan(x.q[i].abs(), (x.v[i] * h).abs()),
         Argument::Velocity(i) => x.v[i].abs(),
         Argument::Action => x.z.abs(),
         Argument::Time => h.abs(),
-        Argument::Parameter(_) => return None,
-    };
-    ridders::derivative(scale(size), |by| {
-        let (mut t, mut x) = (t, x.clone());
-        match along {
-            Argument::Position(i) => x.q[i] += by,
-            Argument::Velocity(i) => x.v[i] += by,
-            Argument::Action => x.z += by,
-            Argument::Time => t += by,
-            Argument::Parameter(_) => {}
-        }
+        Argument::Parameter(_) => f64::NAN,
+    }
+}
+
+/// A time and a point, of which one argument is moved.
+fn moved(along: Argument, (mut t, x): (f64, &Point), by: f64) -> (f64, Point) {
+    let mut x = x.clone();
+    match along {
+        Argument::Position(i) => x.q[i] += by,
+        Argument::Velocity(i) => x.v[i] += by,
+        Argument::Action => x.z += by,
+        Argument::Time => t += by,
+        Argument::Parameter(_) => {}
+    }
+    (t, x)
+}
+
+/// The derivative of a function of the time and the point along one of them, by differences over this part of their
+/// distances, for a motion with steps of length h; `None` along a parameter.
+pub(super) fn difference(
+    along: Argument,
+    (t, x): (f64, &Point),
+    h: f64,
+    part: f64,
+    f: &dyn Fn(f64, &Point) -> Option<Vec<f64>>,
+) -> Option<Vec<f64>> {
+    if matches!(along, Argument::Parameter(_)) {
+        return None;
+    }
+    ridders::derivative(part * scale(size(along, x, h)), |by| {
+        let (t, x) = moved(along, (t, x), by);
         f(t, &x)
     })
 }
 
-/// The derivative of a function of the system in a parameter, by differences.
+/// The derivative of a function of the system in a parameter, by differences over this part of their distances.
 pub(super) fn difference_in_parameter(
     problem: &Differentiable<'_>,
     k: usize,
+    part: f64,
     f: &mut dyn FnMut(&dyn System) -> Option<Vec<f64>>,
 ) -> Option<Vec<f64>> {
     let theta = problem.of.parameters();
-    ridders::derivative(scale(theta.get(k)?.abs()), |by| {
+    ridders::derivative(part * scale(theta.get(k)?.abs()), |by| {
         let mut theta = theta.clone();
         *theta.get_mut(k)? += by;
         problem.of.with_parameters(&theta, f)

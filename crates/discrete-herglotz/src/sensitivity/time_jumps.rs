@@ -319,7 +319,7 @@ fn rates(problem: &Differentiable<'_>, parameter: usize) -> Option<Vec<BreakRate
             let moved = system.breaks();
             (moved.len() == times.len()).then(|| moved.to_vec())
         };
-        difference_in_parameter(problem, parameter, &mut moved).map(with_rates)
+        difference_in_parameter(problem, parameter, 1.0, &mut moved).map(with_rates)
     })
 }
 

@@ -8,6 +8,7 @@
 
 mod collocation;
 mod corner;
+mod departure;
 mod divided;
 mod jumps;
 mod local_motion;

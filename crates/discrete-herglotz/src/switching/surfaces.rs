@@ -3,19 +3,19 @@
 use crate::solve::chebyshev::{Samples, node};
 use crate::solve::roots::bracketed_root;
 use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
-use crate::switching::local_motion::{LocalMotion, rates_along_motion};
+use crate::switching::departure::{DEPARTURE, Departure};
+use crate::switching::local_motion::rates_along_motion;
 use crate::switching::step_curve::{StepCurve, TimedState};
 use crate::system::AtSwitch;
 use crate::{InputError, Point, StepError, System, Vector};
-use contact_geom::numbers::max_or_nan;
 use std::convert::Infallible;
 
 /// The round-off of a switching function, relative to its size on a step: that of the sums of the curve.
 const ROUND_OFF: f64 = 4.0 * f64::EPSILON;
 
 /// The largest number of halvings of the part after a zero, in the search for a point where the function still has its
-/// old sign: down to the round-off of half of the digits of the time.
-const MAX_HALVINGS: i32 = 30;
+/// old sign: down to the round-off of the time.
+const MAX_HALVINGS: i32 = 52;
 
 /// The distance over which the slope of a function at its zero is computed, as a fraction of the interval in which the
 /// zero lies: an error of 1e-8, by the central difference, is enough for Newton's method.
@@ -23,14 +23,6 @@ const SLOPE_DISTANCE: f64 = 1e-4;
 
 /// The relative round-off of the numbers of a point: the sums of a step and the root search.
 const POINT_ROUND_OFF: f64 = 16.0 * f64::EPSILON;
-
-/// The part of a step over which a motion on a surface is followed, forward and backward, to find the side to which it
-/// goes: the Taylor polynomial of the motion is exact enough, and changes are far above their round-off.
-const DEPARTURE: f64 = 1e-5;
-
-/// The part of the change by the second derivative, over [`DEPARTURE`], below which a rate is none: the motion would
-/// return to the surface within 1e-12 of a step.
-const MIN_RATE: f64 = 1e-7;
 
 /// The number of changes of a function, over [`DEPARTURE`] and by round-off, beyond which it is far from zero.
 const FAR: f64 = 64.0;
@@ -63,17 +55,6 @@ pub(super) struct SignChange {
     pub estimate: f64,
     /// The time derivative of the function there.
     pub slope: f64,
-}
-
-/// How a motion leaves a surface on which it is.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Departure {
-    /// The sign that the function takes.
-    pub side: f64,
-    /// The rate of the function.
-    pub rate: f64,
-    /// Whether the rate is not zero up to round-off; otherwise the function changes by its second derivative.
-    pub with_rate: bool,
 }
 
 /// The switching functions of a Lagrangian, with the side of each surface on which the motion is.
@@ -219,35 +200,6 @@ impl Surfaces {
             beyond > 0.0 && beyond > surfaces.rounding(system, i, (t, &end), 0.0)
         };
         others.filter(|i| changed(self, *i) && self.is_on(system, *i, (at.t, &at.argument(system)), h)).collect()
-    }
-
-    /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
-    /// not on the surface, or stays on it to second order. `h` is the length of a step.
-    pub fn departure(
-        &mut self,
-        system: &dyn System,
-        index: usize,
-        (t, x): (f64, &Point),
-        h: f64,
-        tolerance: f64,
-    ) -> Option<Departure> {
-        let here = self.value(system, index, (t, x));
-        if here.is_nan() || here.abs() > tolerance {
-            return None;
-        }
-        let motion = LocalMotion::at(system, t, x);
-        let mut after = |dt: f64| self.value(system, index, (t + dt, &motion.after(dt))) - here;
-        let dt = DEPARTURE * h;
-        let [(later, earlier), (near_later, near_earlier)] = [dt, 0.5 * dt].map(|dt| (after(dt), after(-dt)));
-        // The change by the rate, without that by the third derivative, and the change by the second derivative.
-        let odd = (8.0 * (near_later - near_earlier) - (later - earlier)) / 6.0;
-        let even = 0.5 * (later + earlier);
-        let rounding = self.rounding(system, index, (t, x), dt);
-        match (odd.abs() > max_or_nan(rounding, MIN_RATE * even.abs()), even.abs() > 0.0) {
-            (true, _) => Some(Departure { side: sign(odd), rate: odd / dt, with_rate: true }),
-            (false, true) => Some(Departure { side: sign(even), rate: 0.0, with_rate: false }),
-            (false, false) => None,
-        }
     }
 
     /// The value of a function; NaN for an index without a function.
@@ -433,23 +385,27 @@ impl Surfaces {
         [mut from, to]: [f64; 2],
     ) -> SignChange {
         let side = self.side(index);
-        let mut toward = |fraction: f64| {
+        let toward = |surfaces: &mut Self, fraction: f64| {
             let (t, x) = curve.at(fraction);
-            side * self.value(system, index, (t, &x))
+            side * surfaces.value(system, index, (t, &x))
         };
-        let (mut before, after) = (toward(from), toward(to));
+        let (mut before, after) = (toward(self, from), toward(self, to));
         if before.is_nan() || before <= 0.0 {
-            // The part begins at a zero: find a point where the function still has the sign of its side.
+            // The part begins at a zero: find a point where the function still has the sign of its side, and not by
+            // round-off.
+            let (t, x) = curve.at(from);
+            let rounding = self.rounding(system, index, (t, &x), 0.0);
             let inside = (1..=MAX_HALVINGS).map(|k| from + (to - from) * f64::powi(2.0, -k));
-            match inside.map(|x| (x, toward(x))).find(|(_, value)| *value > 0.0) {
+            match inside.map(|x| (x, toward(self, x))).find(|(_, value)| *value > rounding) {
                 Some(place) => (from, before) = place,
                 None => return SignChange { index, ends: [from, to], estimate: from, slope: 0.0 },
             }
         }
-        let found = bracketed_root([from, to], [before, after], |x| Ok::<_, Infallible>(toward(x)));
+        let found = bracketed_root([from, to], [before, after], |x| Ok::<_, Infallible>(toward(self, x)));
         let estimate = found.unwrap_or(from);
         let distance = SLOPE_DISTANCE * (to - from);
-        let slope = (toward(estimate + distance) - toward(estimate - distance)) / (2.0 * distance * curve.span());
+        let slope =
+            (toward(self, estimate + distance) - toward(self, estimate - distance)) / (2.0 * distance * curve.span());
         SignChange { index, ends: [from, to], estimate, slope: side * slope }
     }
 }

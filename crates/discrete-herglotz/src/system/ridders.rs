@@ -4,7 +4,7 @@
 const LEVELS: i32 = 7;
 
 /// The first distance, in units of the scale of the argument.
-const FIRST_DISTANCE: f64 = 0.0625;
+pub(crate) const FIRST_DISTANCE: f64 = 0.0625;
 
 /// The derivative at 0 of a function with several components, by central differences that are extrapolated to distance 0
 /// (Ridders 1982). Each component is the entry of the table of extrapolation that differs least from its neighbours: for a

@@ -21,6 +21,10 @@ const MAX_PARTS: usize = 4096;
 /// pushed to a surface from both sides has infinitely many.
 const MAX_CHANGES_AT_ONE_POINT: usize = 16;
 
+/// The largest number of resets at one corner of a surface: as many as a wedge of one degree has, of which each turns a
+/// motion by two.
+const MAX_PASSAGES_OF_CORNER: usize = 180;
+
 /// The length of the first part after a reset, in units of the time since the reset before it at the same surface:
 /// longer than the flights of a bouncing motion, which decrease or stay the same.
 const FLIGHTS_PER_PART: f64 = 4.0;
@@ -155,15 +159,26 @@ impl<'a> SwitchingStepper<'a> {
                 if index != change.index && !self.surfaces.is_on(&*system, index, (at.t, &there), self.h) {
                     continue;
                 }
-                let rising = self.surfaces.side(index) < 0.0;
-                let Passed { to: next, factor, passage } = self.through(at.clone(), index, span, spacing)?;
-                let end = PartEnd::Switch { index, rising, passage };
-                // Further passages at the same point are ends of parts of length zero.
-                let (has_stepper, stages) = (std::mem::take(&mut has_stepper), stages.take());
-                let (from, to, after) = (from_there, at.clone(), next.clone());
-                self.ends.push(EndOfPart { from, to, next: after, has_stepper, stages, end });
-                start = start.max(passage.into());
-                (at, from_there, sigma) = (next.clone(), next, sigma * factor);
+                let mut at_corner = false;
+                for passages in 1.. {
+                    let rising = self.surfaces.side(index) < 0.0;
+                    let passed = self.through(at.clone(), index, span, spacing, at_corner)?;
+                    let Passed { to: next, factor, passage, enters_corner } = passed;
+                    let end = PartEnd::Switch { index, rising, passage };
+                    // Further passages at the same point are ends of parts of length zero.
+                    let (has_stepper, stages) = (std::mem::take(&mut has_stepper), stages.take());
+                    let (from, to, after) = (from_there, at.clone(), next.clone());
+                    self.ends.push(EndOfPart { from, to, next: after, has_stepper, stages, end });
+                    start = start.max(passage.into());
+                    (at, from_there, sigma) = (next.clone(), next, sigma * factor);
+                    if !enters_corner {
+                        break;
+                    }
+                    if passages == MAX_PASSAGES_OF_CORNER {
+                        return Err(StepError::Contact { t: at.t });
+                    }
+                    at_corner = true;
+                }
             }
             // The curve of a part that is much longer than the next flight would round it away.
             longest = span.abs().min(FLIGHTS_PER_PART * self.accumulation.last_interval());
