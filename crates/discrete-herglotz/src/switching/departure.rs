@@ -13,6 +13,9 @@ use contact_geom::numbers::max_or_nan;
 /// goes: the Taylor polynomial of the motion is exact enough, and changes are far above their round-off.
 pub(super) const DEPARTURE: f64 = 1e-5;
 
+/// The factor of the times over which a motion is followed further, where the function does not change before.
+const LONGER: f64 = 100.0;
+
 /// The part of the change by the second derivative, over [`DEPARTURE`], below which a rate is none: the motion would
 /// return to the surface within 1e-12 of a step.
 const MIN_RATE: f64 = 1e-7;
@@ -74,8 +77,22 @@ impl Surfaces {
             return None;
         }
         let motion = LocalMotion::at(system, t, x);
+        // The change of a motion that is pressed onto the surface from rest may be round-off over a short time.
+        let times = [1.0, LONGER, LONGER * LONGER].map(|factor| factor * DEPARTURE * h);
+        times.into_iter().find_map(|dt| self.departure_within(system, index, &motion, (t, x, here), h, dt))
+    }
+
+    /// The same by the motion within a time dt before and after the point, at which the function has the value `here`.
+    fn departure_within(
+        &mut self,
+        system: &dyn System,
+        index: usize,
+        motion: &LocalMotion<'_>,
+        (t, x, here): (f64, &Point, f64),
+        h: f64,
+        dt: f64,
+    ) -> Option<Departure> {
         let mut after = |dt: f64| self.value(system, index, (t + dt, &motion.after(dt))) - here;
-        let dt = DEPARTURE * h;
         let [(later, earlier), (near_later, near_earlier)] = [dt, 0.5 * dt].map(|dt| (after(dt), after(-dt)));
         // The change by the rate, without that by the third derivative, and the change by the second derivative.
         let odd = (8.0 * (near_later - near_earlier) - (later - earlier)) / 6.0;

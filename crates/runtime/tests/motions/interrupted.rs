@@ -305,6 +305,18 @@ fn a_body_at_rest_does_not_fall_through_its_floor() {
     }
 }
 
+/// The same by short steps, within a part of which a body at rest moves by less than the round-off of its position.
+#[test]
+fn a_body_at_rest_does_not_fall_through_its_floor_in_short_steps() {
+    let ball = Formula::parse("x'^2/2 - x", &["x"], &[]).unwrap();
+    let formula = ball.with_impact("x - 4.5", Impact::Restitution(0.0), None).unwrap();
+    for h in [1e-2, 3e-3, 1e-3, 3e-4] {
+        let (outcome, _) = with_resets(&formula, Start::new(0.0, [4.6], [0.0], 0.0), 1.0, by_steps(2, h));
+        let contact = matches!(outcome.status, Status::Failed { cause: StepError::Contact { .. }, .. });
+        assert!(contact && outcome.q[0] >= 4.5, "{h}: {}, {:?}", outcome.status, outcome.q);
+    }
+}
+
 /// The function of a reset that is not defined beyond its zero is an error, as that of any event.
 #[test]
 fn a_reset_that_is_undefined_beyond_its_zero_is_an_error() {
