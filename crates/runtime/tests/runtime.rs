@@ -12,5 +12,6 @@ mod motions;
 mod pairs;
 mod path;
 mod rows_beside_kinks;
+mod sensitive;
 mod sensitivity;
 mod sparse;

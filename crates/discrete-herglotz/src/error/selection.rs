@@ -19,6 +19,20 @@ pub enum SelectionFailure {
         /// The last time, in tenths of the span, at which runs agree.
         t: f64,
     },
+    /// The motion is so sensitive to its start that the last digit of the start determines more of it than the requested
+    /// error allows. Runs with different steps may agree with each other nevertheless.
+    #[error(
+        "the motion is ill-conditioned: an error in the last digit of the start {}, and exceeds the requested error \
+         after t = {t}; end the run there, or request a larger error",
+        what_becomes_of_it(*distance)
+    )]
+    IllConditioned {
+        /// The largest distance, in the units of the requested error, from a motion whose start differs in the last
+        /// digits; infinite where its run fails with the same steps.
+        distance: f64,
+        /// The last time, in tenths of the span, at which this distance is below the requested error.
+        t: f64,
+    },
     /// Runs converge more slowly than for a smooth motion.
     #[error("{}", how_runs_converge(*order))]
     Order {
@@ -84,6 +98,11 @@ fn how_far(distance: f64) -> String {
     } else {
         "does not resolve the motion".to_owned()
     }
+}
+
+/// The part of the message for what an error in the last digit of the start becomes.
+fn what_becomes_of_it(distance: f64) -> String {
+    if distance.is_finite() { format!("becomes {distance:.1e}") } else { "makes a step fail".to_owned() }
 }
 
 /// The part of the message for runs that converge with a low order, or not at all.

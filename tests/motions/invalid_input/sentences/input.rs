@@ -23,6 +23,7 @@ use discrete_herglotz::{
     Rows, SelectionFailure, SplittingScheme, State, StepError, StepFailure, Stepper, StepperOptions, Steps, Until,
 };
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
 /// Switching functions that are not declared.
 #[derive(Clone, Copy, Debug)]
@@ -258,6 +259,8 @@ pub enum Odd {
     Explosive,
     /// Duffing's oscillator, driven into chaos.
     Chaotic,
+    /// A pendulum.
+    Pendulum,
     /// A potential with a step at q = 3.
     Stepped,
     /// A force that begins at t = 1.
@@ -272,6 +275,7 @@ impl Lagrangian<1> for Odd {
             Odd::Jumping => kinetic - q[0].abs(),
             Odd::Kicked => kinetic - square * square + (t * 1e12).sin() * q[0] * 1e12,
             Odd::Explosive => kinetic + z * z,
+            Odd::Pendulum => kinetic + q[0].cos(),
             Odd::Stepped => kinetic + q[0] - ((q[0] - 3.0) * 1e10).tanh() * 0.0015,
             Odd::DelayedForce => kinetic + T::from(1.0).if_less(t, q[0] * (t - 1.0) * 100.0, T::from(0.0)),
             Odd::Chaotic => kinetic + square * 0.5 - square * square * 0.25 + (t * 1.4).cos() * q[0] * 0.35 - z * 0.1,
@@ -293,19 +297,22 @@ impl Lagrangian<1> for Odd {
 /// The reasons for which an accuracy is not reached, and their messages.
 #[test]
 fn selection_failures() {
-    let start = VelocityPoint::new([1.0], [0.0], 1.0);
-    let failure = |system: Odd, by: &str, span: f64, wanted: f64| {
+    let failure_from = |q: f64, system: Odd, by: &str, span: f64, wanted: f64| {
         let system = One::from(system);
-        let problem = Problem::new(&system, 0.0, start).unwrap();
+        let problem = Problem::new(&system, 0.0, VelocityPoint::new([q], [0.0], 1.0)).unwrap();
         let run = problem.by(by.parse::<AnyIntegrator>().unwrap()).accuracy(wanted);
         match run.plan(Until::Time(span)).err() {
             Some(InputError::Accuracy { cause, .. }) => cause,
             other => panic!("{other:?}"),
         }
     };
+    let failure = |system, by: &str, span, wanted| failure_from(1.0, system, by, span, wanted);
+    // Upright, of which pi has the error 1e-16: it grows to about one, the round-off of the runs to 1e-3.
+    let upright = || failure_from(PI, Odd::Pendulum, "gauss_8", 40.0, 0.02);
     every!(SelectionFailure, "discrete-herglotz/src/error/selection.rs" {
         SelectionFailure::RoundOff => failure(Odd::Chaotic, "gauss_8", 2.0, 1e-18), ["round-off", "request a larger error"];
         SelectionFailure::Chaos { .. } => failure(Odd::Chaotic, "gauss_8", 600.0, 1e-6), ["chaotic", "after t = ", "request a larger error"];
+        SelectionFailure::IllConditioned { .. } => upright(), ["last digit of the start becomes", "after t = ", "end the run there"];
         SelectionFailure::Order { .. } => failure(Odd::Jumping, "gauss_8", 20.0, 1e-13), ["order", "not smooth", "request a larger error"];
         SelectionFailure::DefectBetweenNodes { .. } => failure(Odd::Stepped, "gauss_8", 3.0, 1e-6), ["between the nodes", "only with order", "smooth the Lagrangian"];
         SelectionFailure::FeatureAtNodes { .. } => failure(Odd::DelayedForce, "gauss_8", 2.0, 1e-9), ["one more step", "with the ends of the steps", "end the span before it"];

@@ -23,6 +23,8 @@ pub(crate) struct Converged {
     pub k: usize,
     /// The error of the run with k steps, and the predicted error of the run with 2k steps.
     pub errors: [f64; 2],
+    /// The error that a change of the last digit of the start causes, if it was measured; otherwise 0.
+    pub last_digit: f64,
     /// The largest defect between the nodes of the run with k steps, and the order with which it decreases, half the
     /// order of the error.
     pub defect: f64,
@@ -81,7 +83,8 @@ pub(crate) fn selected<'p>(
     error: f64,
     found: &Converged,
 ) -> StepSelection<'p> {
-    let (h, integrator, error) = (trials.step(count, &found.grid), integrator.clone(), Some(error));
+    let error = Some(max_or_nan(error, found.last_digit));
+    let (h, integrator) = (trials.step(count, &found.grid), integrator.clone());
     if let ComparisonGrid::Times = found.grid {
         // The last step is about half as long as the others, so that round-off does not add a step.
         let count = (found.reference.tau / h + 0.5).ceil().max(1.0);
@@ -120,6 +123,8 @@ pub(crate) fn converge(
     // The finer of the last two runs, and their distance.
     let (mut known, mut before): (Option<Track>, f64) = (None, f64::NAN);
     let (mut predicted, mut irregular) = (false, false);
+    // The coarser of the last two runs, its number of steps, and the order that both show.
+    let mut last: Option<(usize, Track, f64)> = None;
     'search: for _ in 0..MAX_ITERATIONS {
         if 2.0 * k as f64 > MAX_STEPS {
             break;
@@ -208,9 +213,12 @@ pub(crate) fn converge(
             disagreement = disagreement_of_other_nodes(trials, stages, k, compared, goal, fine)?;
         }
         if falls && agreed && disagreement.is_none() {
+            let repeat = |trials: &mut TrialRuns<'_, '_>| trials.gauss_without_samples(stages, k, &grid);
+            let last_digit = trials.error_of_last_digit([coarse, fine], repeat)?;
             return Ok(Converged {
                 k,
                 errors: [error, beyond],
+                last_digit,
                 defect: coarse.defect,
                 order,
                 finer_is_cheaper: fine.cost < coarse.cost,
@@ -223,6 +231,8 @@ pub(crate) fn converge(
         let apart = error;
         let error = max_or_nan(error, disagreement.unwrap_or(0.0));
         stagnations = if error < 0.5 * best { 0 } else { stagnations + 1 };
+        let order_of_errors = f64::log2(before / error);
+        last = Some((k, coarse.clone(), order_of_errors));
         cause = if !falls && agreed {
             SelectionFailure::DefectBetweenNodes { defect: fine.defect, order }
         } else if !falls {
@@ -235,7 +245,7 @@ pub(crate) fn converge(
         } else if fine.has_underflown() {
             SelectionFailure::RoundOff
         } else {
-            cause_of_disagreement(&distances, (before / error).log2(), wanted, t0, span)
+            cause_of_disagreement(&distances, order_of_errors, wanted, t0, span)
         };
         (best, before) = (if error < best { error } else { best }, error);
         nearest = if apart < nearest { apart } else { nearest };
@@ -246,6 +256,10 @@ pub(crate) fn converge(
         }
         known = Some(fine.clone());
         k *= 2;
+    }
+    if let Some((k, coarse, order)) = last {
+        let repeat = |trials: &mut TrialRuns<'_, '_>| trials.gauss_without_samples(stages, k, &grid);
+        cause = trials.tested_cause(cause, (k, &coarse, order), repeat)?;
     }
     Err(failed(nearest, cause).into())
 }

@@ -26,6 +26,8 @@ pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSe
     let mut max_defect = (PART_DEFECT_PER_ROOT * wanted.sqrt()).min(MAX_PART_DEFECT);
     let (mut best, mut before, mut cause) = (f64::INFINITY, f64::NAN, SelectionFailure::Budget);
     let mut coarse: Option<Track> = None;
+    // The coarser of the last two runs, and the order that both show.
+    let mut last: Option<(DividedGauss, Track, f64)> = None;
     for _ in 0..MAX_DIVISIONS {
         let integrator = DividedGauss { stages: DIVIDED_STAGES, max_defect };
         let mut track =
@@ -53,7 +55,9 @@ pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSe
         };
         let error = max_or_nan(first.distance(&second), 0.5 * f64::EPSILON);
         if error <= MAX_DISTANCE_OF_DIVISIONS * wanted {
-            let (h, error) = (span / count as f64, Some(error));
+            let repeat = |trials: &mut TrialRuns<'_, 'p>| trials.divided(integrator, count, &grid);
+            let last_digit = trials.error_of_last_digit([&first, &second], repeat)?;
+            let (h, error) = (span / count as f64, Some(max_or_nan(error, last_digit)));
             return Ok(StepSelection {
                 integrator: trials.collocation.divided_gauss(integrator),
                 count,
@@ -63,13 +67,19 @@ pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSe
             });
         }
         let distances = first.distances(&second);
-        cause = cause_of_disagreement(&distances, f64::log2(before / error), wanted, t0, span);
+        let order = f64::log2(before / error);
+        cause = cause_of_disagreement(&distances, order, wanted, t0, span);
+        last = Some((integrator, first, order));
         (best, before) = (best.min(error), error);
         max_defect *= finer;
         if max_defect < MIN_COMPARED_DEFECT {
             break;
         }
         coarse = Some(second);
+    }
+    if let Some((integrator, first, order)) = last {
+        let repeat = |trials: &mut TrialRuns<'_, 'p>| trials.divided(integrator, count, &grid);
+        cause = trials.tested_cause(cause, (count, &first, order), repeat)?;
     }
     Err(InputError::Accuracy { wanted, reached: best, cause })
 }

@@ -221,6 +221,10 @@ pub(crate) const MAX_STAGNATING_RATIO: f64 = 0.7;
 /// The number of refinements in a row without effect after which the search ends.
 pub(crate) const MAX_STAGNATIONS_FROM_REFERENCE: usize = 4;
 
+/// The error that the distances of runs predict for a change of the last digit of the start, in units of the requested
+/// error, from which it is measured: growth before the first comparison is not seen, nor that of single coordinates.
+pub(crate) const MIN_MEASURED_ERROR: f64 = 0.01;
+
 // The cause for which runs do not agree.
 
 /// Runs that differ only by round-off show an order below this: that of the lowest collocation method.

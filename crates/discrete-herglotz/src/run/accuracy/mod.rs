@@ -11,6 +11,7 @@ mod estimate;
 mod evaluation_cost;
 mod failure;
 mod first_guess;
+mod last_digit;
 pub(crate) mod limits;
 mod matrices;
 mod reference;

@@ -118,7 +118,10 @@ fn select_integrator<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection
     // first error is returned.
     if divides
         && let Err(Ended::Refused(refused @ InputError::Accuracy { cause, .. })) = &found
-        && !matches!(cause, SelectionFailure::RoundOff | SelectionFailure::Chaos { .. })
+        && !matches!(
+            cause,
+            SelectionFailure::RoundOff | SelectionFailure::Chaos { .. } | SelectionFailure::IllConditioned { .. }
+        )
     {
         return divided_steps(trials).map_err(|divided| match divided {
             InputError::Accuracy { reached, .. } if reached.is_finite() => divided,

@@ -105,6 +105,20 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         self.run_with_samples(&mut *stepper, &settings, stride)
     }
 
+    /// The motion of [`gauss`](Self::gauss), without defect samples: near an equilibrium they see its round-off.
+    pub fn gauss_without_samples(
+        &mut self,
+        stages: usize,
+        count: usize,
+        grid: &ComparisonGrid,
+    ) -> Result<TrialEnd, InputError> {
+        let integrator = match grid {
+            ComparisonGrid::Times => self.collocation.transformed_gauss(stages),
+            ComparisonGrid::Steps { .. } => self.collocation.gauss(stages),
+        };
+        self.with_integrator(&integrator, count, grid)
+    }
+
     /// Computes the motion by Gauss collocation with steps that are divided where their defect exceeds the bound of the
     /// integrator.
     pub fn divided(
