@@ -5,7 +5,8 @@ use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::failure::cause_of_disagreement;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{
-    DIVIDED_STAGES, DIVIDED_STEPS, MAX_DISTANCE_OF_DIVISIONS, MAX_DIVISIONS, MAX_PART_DEFECT, PART_DEFECT_PER_ROOT,
+    DIVIDED_STAGES, DIVIDED_STEPS, MAX_DISTANCE_OF_DIVISIONS, MAX_DIVISIONS, MAX_PART_DEFECT, NEGLIGIBLE_DEFECT,
+    PART_DEFECT_PER_ROOT,
 };
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_end::TrialEnd;
@@ -54,7 +55,10 @@ pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSe
             }
         };
         let error = max_or_nan(first.distance(&second), 0.5 * f64::EPSILON);
-        if error <= MAX_DISTANCE_OF_DIVISIONS * wanted {
+        // Equal runs, of the same parts, compare nothing: the defect of these must be negligible.
+        let negligible = max_or_nan(NEGLIGIBLE_DEFECT * wanted, MIN_COMPARED_DEFECT);
+        let compared = first.distance(&second) > 0.0 || max_defect * finer <= negligible;
+        if compared && error <= MAX_DISTANCE_OF_DIVISIONS * wanted {
             let repeat = |trials: &mut TrialRuns<'_, 'p>| trials.divided(integrator, count, &grid);
             let last_digit = trials.error_of_last_digit([&first, &second], repeat)?;
             let (h, error) = (span / count as f64, Some(max_or_nan(error, last_digit)));
