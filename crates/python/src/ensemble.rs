@@ -129,6 +129,7 @@ pub struct EnsembleRecord {
     /// The times of the rows.
     times: Option<Py<PyArray1<f64>>>,
     batch_kernel: usize,
+    own_plans: usize,
     /// The exception that a signal handler has raised.
     interrupted: Option<Py<PyAny>>,
 }
@@ -292,6 +293,7 @@ pub fn run_ensemble(
         crossings: kept.crossings.into_iter().map(found).collect(),
         times: rows.map(|rows| vector(py, rows)),
         batch_kernel: tally.batch_kernel,
+        own_plans: tally.own_plans,
         interrupted: raised.map(|raised| raised.into_value(py).into_any()),
     })
 }

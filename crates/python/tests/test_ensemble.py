@@ -89,6 +89,19 @@ def test_events_of_members_are_those_of_single_motions():
     assert none.events[0].q.shape == (0, 1) and none.events[0].member.dtype == int
 
 
+def test_members_with_fast_phases_vary_their_steps():
+    # The thermostat of Nose, whose clock s comes near 0: equal steps fail.
+    nose = dict(coordinates=["x", "s"], parameters={"m": 0.1}, accuracy=1e-8)
+    text, q = "s^2*x'^2/2 + m*s'^2/2 - x^2/2 - log(s)", np.array([[0.4, 0.8], [1.0, 1.2], [1.6, 0.6]])
+    v = np.tile([0.3, 0.0], (3, 1))
+    many = hz.ensemble(text, q, v, 20.0, **nose)
+    assert many.success.all() and many.own_plans == 3
+    for i in range(3):
+        assert np.array_equal(many.q[i], hz.solve(text, q[i], v[i], 20.0, **nose).q[-1])
+    given = hz.ensemble(text, q, v, 0.1, integrator="gauss_4", step=0.01, coordinates=["x", "s"], parameters={"m": 0.1})
+    assert given.own_plans == 0
+
+
 def test_shapes_are_checked():
     ask = lambda q, v, **more: hz.ensemble(PENDULUM, q, v, 1.0, coordinates=NAMES, **more)
     with pytest.raises(ValueError, match="`q0`"):

@@ -12,6 +12,8 @@ mod corners;
 mod dimensions;
 #[path = "motions/ensembles.rs"]
 mod ensembles;
+#[path = "motions/ensembles_own_steps.rs"]
+mod ensembles_own_steps;
 #[path = "motions/hamiltonians.rs"]
 mod hamiltonians;
 #[path = "motions/interrupted.rs"]

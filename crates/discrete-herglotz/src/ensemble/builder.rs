@@ -94,13 +94,14 @@ impl<'m, L: Lagrangian<N> + Sync, const N: usize> Ensemble<'_, Lagrangians<'m, L
             (lagrangian, start.into())
         };
         let of = Box::new(members);
-        let members = Lagrangians { of, t0, integrator: None, length: None };
+        let members = Lagrangians { of, t0, integrator: None, selects_integrator: false, length: None };
         Ensemble { members, settings: Settings::new(count) }
     }
 
     /// Sets the integrator.
     pub fn by(self, integrator: impl Integrator<'m, L, N> + Sync + 'm) -> Self {
-        let members = Lagrangians { integrator: Some(Box::new(integrator)), ..self.members };
+        let integrator: Option<Box<dyn Integrator<'m, L, N> + Sync + 'm>> = Some(Box::new(integrator));
+        let members = Lagrangians { integrator, selects_integrator: false, ..self.members };
         Ensemble { members, ..self }
     }
 
@@ -177,11 +178,11 @@ impl<'a, M: Members> Ensemble<'a, M> {
     }
 
     /// Checks the common input of all members, and all input of some of them.
-    pub(crate) fn task(&self, until: Until) -> Result<Task<'_>, EnsembleError> {
+    pub(crate) fn task(&self, until: Until, observed: bool) -> Result<Task<'_>, EnsembleError> {
         if self.settings.count == 0 {
             return Err(EnsembleError::Empty);
         }
         self.members.is_complete().map_err(|cause| EnsembleError::Member { index: 0, cause })?;
-        Task::checked(&self.members, &self.settings, until)
+        Task::checked(&self.members, &self.settings, until, observed)
     }
 }

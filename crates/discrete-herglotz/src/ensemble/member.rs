@@ -50,6 +50,9 @@ pub struct Tally {
     pub unresolved: usize,
     /// The members that were computed in lanes; the others had a run of their own.
     pub batch_kernel: usize,
+    /// The members that have steps of their own, selected by trial runs for an accuracy: those that were not computed in
+    /// lanes.
+    pub own_plans: usize,
     /// The index of the first member that failed.
     pub first_failed: Option<usize>,
 }

@@ -14,6 +14,17 @@ use contact_geom::{ChartVector, Derivatives, Lagrangian, PhasePoint, VelocityPoi
 /// The run of a member.
 pub type MemberRun<'p, 'o> = Run<'p, 'o, ()>;
 
+/// The steps of the run of a member.
+#[derive(Clone, Copy, PartialEq)]
+pub enum MemberSteps {
+    /// Those of a single run.
+    Own,
+    /// Steps that all members can take together in lanes: equal steps of the integrator.
+    Common,
+    /// These.
+    Given(Steps),
+}
+
 /// The members of an ensemble with their integrator and its steps.
 pub trait Members: Sync {
     /// The number of coordinates.
@@ -28,6 +39,10 @@ pub trait Members: Sync {
     /// The requested error, if one is requested.
     fn requested_error(&self) -> Option<f64>;
 
+    /// Whether the run of a member has an integrator that is selected for its accuracy; that of the ensemble is then the
+    /// one of the lanes.
+    fn selects_integrator(&self) -> bool;
+
     /// The time of all starts.
     fn t0(&self) -> f64;
 
@@ -37,14 +52,14 @@ pub trait Members: Sync {
     /// [`InputError::NoIntegrator`], [`InputError::NoSteps`].
     fn is_complete(&self) -> Result<(), InputError>;
 
-    /// Calls a function with the run of a member, which has the steps of the ensemble, or these, and this interrupt.
+    /// Calls a function with the run of a member, which has these steps and this interrupt.
     ///
     /// # Errors
     /// Those of [`Problem::new`].
     fn with_run(
         &self,
         index: usize,
-        settings: (Option<Steps>, Option<Interrupt<'_>>),
+        settings: (MemberSteps, Option<Interrupt<'_>>),
         then: &mut dyn FnMut(MemberRun<'_, '_>),
     ) -> Result<(), InputError>;
 
@@ -84,6 +99,8 @@ pub struct Lagrangians<'a, L, const N: usize> {
     pub(crate) of: MemberOf<'a, L, N>,
     pub(crate) t0: f64,
     pub(crate) integrator: Option<Box<dyn Integrator<'a, L, N> + Sync + 'a>>,
+    /// See [`Members::selects_integrator`].
+    pub(crate) selects_integrator: bool,
     pub(crate) length: Option<StepControl<L, N>>,
 }
 
@@ -104,14 +121,19 @@ impl<'a, L: Lagrangian<N>, const N: usize> Lagrangians<'a, L, N> {
     pub(crate) fn with<R, E: From<InputError>>(
         &self,
         index: usize,
-        (steps, interrupt): (Option<Steps>, Option<Interrupt<'_>>),
+        (steps, interrupt): (MemberSteps, Option<Interrupt<'_>>),
         then: impl FnOnce(Run<'_, '_, Problem<'_, L, N>>) -> Result<R, E>,
     ) -> Result<R, E> {
         let (integrator, length) = self.method()?;
         let (lagrangian, start) = (self.of)(index);
         let problem = Problem { interrupt, ..Problem::new(lagrangian, self.t0, start)? };
-        let run = problem.by(OfMember { integrator, lagrangian });
-        then(steps.map_or(length, StepControl::Given).of(run))
+        let by = || problem.by(OfMember { integrator, lagrangian });
+        then(match (steps, length) {
+            (MemberSteps::Given(steps), _) | (_, StepControl::Given(steps)) => by().steps(steps),
+            (_, StepControl::Accuracy(wanted, within)) if !self.selects_integrator => within(by(), wanted, false),
+            (MemberSteps::Common, StepControl::Accuracy(wanted, within)) => within(by(), wanted, true),
+            (MemberSteps::Own, StepControl::Accuracy(wanted, within)) => within(Run::typed(&problem), wanted, false),
+        })
     }
 }
 
@@ -135,6 +157,10 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Members for Lagrangians<'_, L, N> 
         self.length.and_then(|length| length.requested_error())
     }
 
+    fn selects_integrator(&self) -> bool {
+        self.selects_integrator && self.requested_error().is_some()
+    }
+
     fn t0(&self) -> f64 {
         self.t0
     }
@@ -146,7 +172,7 @@ impl<L: Lagrangian<N> + Sync, const N: usize> Members for Lagrangians<'_, L, N> 
     fn with_run(
         &self,
         index: usize,
-        settings: (Option<Steps>, Option<Interrupt<'_>>),
+        settings: (MemberSteps, Option<Interrupt<'_>>),
         then: &mut dyn FnMut(MemberRun<'_, '_>),
     ) -> Result<(), InputError> {
         self.with(index, settings, |run| {

@@ -73,7 +73,7 @@ impl<M: Members, F, T> ObservedEnsemble<'_, M, F, T> {
             return Err(EnsembleError::Observed);
         }
         let settings = &self.of.settings;
-        let (threads, task) = (settings.some_threads()?, self.of.task(until)?);
+        let (threads, task) = (settings.some_threads()?, self.of.task(until, true)?);
         Ok(run_observed(&task, (settings, threads), &self.observer, &self.extract, &mut fold))
     }
 }
@@ -104,6 +104,7 @@ fn run_observed<O: Observer, S: Send>(
     shards::in_order(threads, shards, work, |members| {
         for (member, result) in members {
             tally.add(&member);
+            tally.own_plans += task.own_plans(1);
             fold(&member, result);
         }
         done += 1;

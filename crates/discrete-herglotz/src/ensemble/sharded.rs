@@ -45,7 +45,7 @@ impl<'a, M: Members> Ensemble<'a, M> {
     /// # Errors
     /// Those of [`Ensemble::run`] before the computation starts.
     pub fn in_shards(&self, until: Until) -> Result<ShardedEnsemble<'_>, EnsembleError> {
-        Ok(ShardedEnsemble { task: self.task(until)? })
+        Ok(ShardedEnsemble { task: self.task(until, false)? })
     }
 
     /// Starts merging the shards of this ensemble. With a [checkpoint](Ensemble::checkpoint) the fold is called with the
@@ -180,6 +180,7 @@ impl Merge<'_, '_, '_> {
             self.sharded.task.run_again(&mut shard);
         }
         self.tally.batch_kernel += shard.batch_kernel;
+        self.tally.own_plans += self.sharded.task.own_plans(shard.members.len().saturating_sub(shard.batch_kernel));
         for member in &shard.members {
             self.tally.add(member);
             (self.fold)(member);

@@ -1,11 +1,12 @@
 //! The run of a single member.
 
+use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Ending, Member};
-use crate::ensemble::members::Members;
+use crate::ensemble::members::{MemberSteps, Members};
 use crate::run::Interruption;
 use crate::{
     InputError, Integrator, Interrupt, MethodInfo, Observer, Outcome, Plan, Problem, Rows, StepError, Stepper,
-    StepperOptions, Steps, Until,
+    StepperOptions, Until,
     integration::{BatchKernel, StepFormula},
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -95,7 +96,7 @@ impl Common {
     ) -> Member {
         let mut rows = Vec::new();
         let mut outcome: Result<Outcome, InputError> = Err(InputError::NoSteps);
-        let started = members.with_run(index, (None, interrupt), &mut |run| {
+        let started = members.with_run(index, (MemberSteps::Own, interrupt), &mut |run| {
             let run = if self.action { run } else { run.without_action() };
             let mut asking = interrupt.map(Interruption);
             let run = match &mut asking {
@@ -128,13 +129,37 @@ impl Common {
         self.rows.map_or(0, |stride| steps / stride.max(1) + 2)
     }
 
-    /// The step size and the number of steps of the run of a member, with its own steps or these, after all checks of a
-    /// plan.
+    /// The plan with the most steps among those of some members, and the member; the first error if none has a plan.
+    ///
+    /// # Errors
+    /// [`EnsembleError::Member`] with a false claim of structure, or an interruption.
+    pub fn longest_plan(
+        &self,
+        members: &dyn Members,
+        sample: impl Iterator<Item = usize>,
+        settings: (MemberSteps, Option<Interrupt<'_>>),
+    ) -> Result<Result<(usize, (f64, usize)), EnsembleError>, EnsembleError> {
+        let mut planned = Err(EnsembleError::Empty);
+        for index in sample {
+            match (self.plan(members, index, settings), &planned) {
+                (Ok(plan), Ok((_, (_, most)))) if plan.1 <= *most => {}
+                (Ok(plan), _) => planned = Ok((index, plan)),
+                (Err(cause @ (InputError::FalseClaim { .. } | InputError::Interrupted)), _) => {
+                    return Err(EnsembleError::Member { index, cause });
+                }
+                (Err(cause), Err(EnsembleError::Empty)) => planned = Err(EnsembleError::Member { index, cause }),
+                (Err(_), _) => {}
+            }
+        }
+        Ok(planned)
+    }
+
+    /// The step size and the number of steps of the run of a member with these steps, after all checks of a plan.
     pub fn plan(
         &self,
         members: &dyn Members,
         index: usize,
-        settings: (Option<Steps>, Option<Interrupt<'_>>),
+        settings: (MemberSteps, Option<Interrupt<'_>>),
     ) -> Result<(f64, usize), InputError> {
         let mut planned = Err(InputError::NoSteps);
         members.with_run(index, settings, &mut |run| {

@@ -1,13 +1,12 @@
 //! The steps of the members.
 
 use crate::{Problem, Run, Steps};
-use contact_geom::Lagrangian;
 
 /// The run of a member.
 pub(crate) type TypedRun<'p, 'o, L, const N: usize> = Run<'p, 'o, Problem<'p, L, N>>;
 
-/// [`Run::accuracy`].
-type Within<L, const N: usize> = for<'p, 'o> fn(TypedRun<'p, 'o, L, N>, f64) -> TypedRun<'p, 'o, L, N>;
+/// [`Run::accuracy`], or with `true` `Run::accuracy_of_equal_steps`.
+type Within<L, const N: usize> = for<'p, 'o> fn(TypedRun<'p, 'o, L, N>, f64, bool) -> TypedRun<'p, 'o, L, N>;
 
 /// How the steps of the members are determined.
 pub(crate) enum StepControl<L, const N: usize> {
@@ -25,15 +24,7 @@ impl<L, const N: usize> Clone for StepControl<L, N> {
 
 impl<L, const N: usize> Copy for StepControl<L, N> {}
 
-impl<L: Lagrangian<N>, const N: usize> StepControl<L, N> {
-    /// A run with these steps.
-    pub fn of<'p, 'o>(&self, run: TypedRun<'p, 'o, L, N>) -> TypedRun<'p, 'o, L, N> {
-        match self {
-            StepControl::Given(steps) => run.steps(*steps),
-            StepControl::Accuracy(wanted, within) => within(run, *wanted),
-        }
-    }
-
+impl<L, const N: usize> StepControl<L, N> {
     /// The requested error, if one is requested.
     pub fn requested_error(&self) -> Option<f64> {
         if let StepControl::Accuracy(wanted, _) = self { Some(*wanted) } else { None }

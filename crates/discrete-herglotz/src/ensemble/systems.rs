@@ -1,7 +1,7 @@
 //! Ensembles of systems with any number of coordinates.
 
 use crate::ensemble::builder::Ensemble;
-use crate::ensemble::members::{LaneKernel, MemberRun, Members};
+use crate::ensemble::members::{LaneKernel, MemberRun, MemberSteps, Members};
 use crate::ensemble::settings::Settings;
 use crate::integration::BatchKernel;
 use crate::switching::{CollocationByPoints, CollocationSteppers};
@@ -128,6 +128,10 @@ impl Members for Systems<'_> {
         }
     }
 
+    fn selects_integrator(&self) -> bool {
+        self.stages.is_none() && self.requested_error().is_some()
+    }
+
     fn t0(&self) -> f64 {
         self.t0
     }
@@ -139,7 +143,7 @@ impl Members for Systems<'_> {
     fn with_run(
         &self,
         index: usize,
-        (steps, interrupt): (Option<Steps>, Option<Interrupt<'_>>),
+        (steps, interrupt): (MemberSteps, Option<Interrupt<'_>>),
         then: &mut dyn FnMut(MemberRun<'_, '_>),
     ) -> Result<(), InputError> {
         let (system, start) = (self.of)(index);
@@ -148,7 +152,8 @@ impl Members for Systems<'_> {
             Some(interrupt) => problem.with_interrupt(interrupt),
             None => problem,
         };
-        let run = match (steps.map_or(self.length, |steps| Some(Length::Given(steps))), self.stages) {
+        let length = if let MemberSteps::Given(steps) = steps { Some(Length::Given(steps)) } else { self.length };
+        let run = match (length, self.stages) {
             (None, _) => return Err(InputError::NoSteps),
             (Some(Length::Given(steps)), _) => problem.by(self.integrator()).steps(steps),
             (Some(Length::Accuracy(wanted)), None) => problem.accuracy(wanted),

@@ -3,7 +3,7 @@
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::lane::{Lane, LaneOptions, LaneStatus};
 use crate::ensemble::member::{Ending, Member};
-use crate::ensemble::members::{LaneKernel, Members};
+use crate::ensemble::members::{LaneKernel, MemberSteps, Members};
 use crate::ensemble::settings::Settings;
 use crate::ensemble::single::Common;
 use crate::numbers::instructions::Instructions;
@@ -34,6 +34,8 @@ pub(crate) struct Task<'e> {
     pub common: Common,
     /// The step size and the number of steps.
     pub plan: (f64, usize),
+    /// Whether there are steps for lanes: not where equal steps suit none of the checked members.
+    pub takes_lanes: bool,
     pub interrupt: Option<Interrupt<'e>>,
     /// The kernels of all members, if they have one Lagrangian.
     pub kernels: Option<LaneKernels<'e>>,
@@ -55,34 +57,37 @@ type Before = (usize, *const (), Option<State>);
 type At<'s> = (f64, &'s State);
 
 impl<'e> Task<'e> {
-    /// Checks the common input of all members, and all input of some of them.
+    /// Checks the common input of all members, and all input of some of them. Members with observers have runs of their
+    /// own.
     pub(crate) fn checked(
         members: &'e dyn Members,
         settings: &'e Settings<'_>,
         until: Until,
+        observed: bool,
     ) -> Result<Self, EnsembleError> {
         let Settings { count, instructions, interrupt, .. } = *settings;
         let common = Common { until, action: settings.action, rows: settings.rows };
         if let Some(stride) = settings.rows {
             Rows::every(stride).map_err(|cause| EnsembleError::Member { index: 0, cause })?;
         }
-        let (mut planned, mut refused) = (None, None);
-        for index in settings.sample() {
-            match common.plan(members, index, (None, interrupt)) {
-                Ok(plan) if planned.is_some_and(|(_, largest): (usize, (f64, usize))| plan.1 <= largest.1) => {}
-                Ok(plan) => planned = Some((index, plan)),
-                Err(cause @ (InputError::FalseClaim { .. } | InputError::Interrupted)) => {
-                    return Err(EnsembleError::Member { index, cause });
-                }
-                Err(cause) => refused = refused.or(Some(EnsembleError::Member { index, cause })),
-            }
+        let longest_plan = |steps| common.longest_plan(members, settings.sample(), (steps, interrupt));
+        let mut takes_lanes = members.batch_kernel().is_some() && !observed;
+        let mut planned = longest_plan(if takes_lanes { MemberSteps::Common } else { MemberSteps::Own })?;
+        if planned.is_err() && takes_lanes && members.selects_integrator() {
+            // Equal steps suit none of these members; runs of their own may have others.
+            takes_lanes = false;
+            planned = longest_plan(MemberSteps::Own)?;
         }
-        let Some((index, mut plan)) = planned else { return Err(refused.unwrap_or(EnsembleError::Empty)) };
+        if observed && let Err(EnsembleError::Member { index, cause: InputError::Accuracy { .. } }) = planned {
+            // The observer of a member may end its motion before it becomes too difficult.
+            planned = Ok((index, (0.0, 0)));
+        }
+        let (index, mut plan) = planned?;
         let refused = |cause| EnsembleError::Member { index, cause };
         let to_accuracy = members.requested_error().is_some();
-        if to_accuracy && members.batch_kernel().is_some() {
+        if to_accuracy && takes_lanes {
             let steps = Steps::Count(plan.1 + plan.1.div_ceil(STEPS_PER_EXTRA_STEP));
-            plan = common.plan(members, index, (Some(steps), interrupt)).map_err(refused)?;
+            plan = common.plan(members, index, (MemberSteps::Given(steps), interrupt)).map_err(refused)?;
         }
         rows::check(common.rows_of(plan.1).saturating_mul(count.min(MEMBERS_PER_SHARD))).map_err(refused)?;
         let check_resolution = settings.check_resolution && !to_accuracy;
@@ -93,6 +98,7 @@ impl<'e> Task<'e> {
             check_resolution,
             common,
             plan,
+            takes_lanes,
             interrupt,
             kernels: None,
             fingerprint: 0,
@@ -112,7 +118,7 @@ impl<'e> Task<'e> {
     /// The kernels for the Lagrangian of a member, whose constants are read at a state.
     pub(crate) fn kernels_of(&self, index: usize, state: Option<&State>) -> LaneKernels<'e> {
         let (h, steps) = self.plan;
-        let Some(state) = state else { return [None, None] };
+        let Some(state) = state.filter(|_| self.takes_lanes) else { return [None, None] };
         let kernel = |plan| self.members.kernel((index, state), plan, self.interrupt);
         [kernel(self.plan), self.members.requested_error().and_then(|_| kernel((0.5 * h, 2 * steps)))]
     }
@@ -125,6 +131,8 @@ impl<'e> Task<'e> {
         words.extend([self.plan.1, rows.unwrap_or(0)].map(|x| x as u64));
         words.push(members.requested_error().unwrap_or(0.0).to_bits());
         words.extend(members.info().name.bytes().map(u64::from));
+        // The steps of other members are not those of this integrator.
+        words.extend(members.selects_integrator().then_some(1));
         words.extend(sample.flat_map(|index| members.digits(index)).map(f64::to_bits));
         digest(&words)
     }
@@ -140,6 +148,11 @@ impl<'e> Task<'e> {
         for member in shard.members.iter_mut().filter(|member| member.ending.is_err()) {
             *member = self.run_single(member.index, None::<&mut Rows<'_>>);
         }
+    }
+
+    /// How many of so many members with runs of their own have plans of their own.
+    pub(crate) fn own_plans(&self, runs: usize) -> usize {
+        if self.members.requested_error().is_some() { runs } else { 0 }
     }
 
     /// Runs a member with a run of its own, and with an observer if there is one.

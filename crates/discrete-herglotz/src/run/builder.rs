@@ -7,7 +7,7 @@ use crate::run::integrate::integrate;
 use crate::run::observers::observer::{Borrowed, Observer};
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::planning::NO_STEP;
-use crate::run::request::{Request, StepControl, Steps, Until};
+use crate::run::request::{Request, SelectSteps, StepControl, Steps, Until};
 use crate::run::{Outcome, Plan, ResumeState};
 use crate::switching::{Collocation, CollocationByPoints, CollocationOf, CollocationSteppers};
 use crate::{GaussCollocation, InputError, Integrator, Problem, Vector};
@@ -69,8 +69,8 @@ impl<'p, 'o, P> Run<'p, 'o, P> {
         Run { problem: &(), system, parts, integrator, length, needs, scales, estimated, observers, from }
     }
 
-    fn within(self, wanted: f64, collocation: Collocation<'p>) -> Self {
-        Run { length: Some(StepControl::Accuracy(wanted, accuracy::select_steps, collocation)), ..self }
+    fn within(self, wanted: f64, select_steps: SelectSteps<'p>, collocation: Collocation<'p>) -> Self {
+        Run { length: Some(StepControl::Accuracy(wanted, select_steps, collocation)), ..self }
     }
 
     /// Sets the size or the number of the steps.
@@ -195,7 +195,8 @@ impl<'p, P> Run<'p, '_, P> {
 }
 
 impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
-    fn typed(problem: &'p Problem<'p, L, N>) -> Self {
+    /// A run of the problem without an integrator and without steps.
+    pub(crate) fn typed(problem: &'p Problem<'p, L, N>) -> Self {
         // Written so that collocation is not compiled for a Lagrangian whose steps have no parts.
         let parts: Option<Collocation<'p>> = if const { L::HINTS.switching_functions } {
             Some(Arc::new(CollocationOf(problem.lagrangian)))
@@ -223,7 +224,13 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// takes far fewer steps.
     pub fn accuracy(self, wanted: f64) -> Self {
         let collocation = Arc::new(CollocationOf::<L, N>(self.problem.lagrangian));
-        self.within(wanted, collocation)
+        self.within(wanted, accuracy::select_steps, collocation)
+    }
+
+    /// Requests an error of a run whose steps are equal: its plan is refused where divided steps would be far fewer.
+    pub(crate) fn accuracy_of_equal_steps(self, wanted: f64) -> Self {
+        let collocation = Arc::new(CollocationOf::<L, N>(self.problem.lagrangian));
+        self.within(wanted, accuracy::select_equal_steps, collocation)
     }
 }
 
@@ -236,7 +243,7 @@ impl<'p> Run<'p, '_> {
     /// Requests an error instead of a step size, as in a run of a [`Problem`]. If no number of stages is given, there are 8,
     /// or the steps are divided where the motion is fast.
     pub fn accuracy(self, wanted: f64) -> Self {
-        self.within(wanted, Arc::new(CollocationByPoints))
+        self.within(wanted, accuracy::select_steps, Arc::new(CollocationByPoints))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Derivatives of the members of an ensemble.
 
+use crate::ensemble::members::MemberSteps;
 use crate::ensemble::shards;
 use crate::ensemble::{EnsembleError, Lagrangians};
 use crate::run::Interruption;
@@ -143,7 +144,7 @@ impl<L: Parametric<N> + Sync, const N: usize> Ensemble<'_, Lagrangians<'_, L, N>
         members.method().map_err(|cause| EnsembleError::Member { index: 0, cause })?;
         let member = |index: usize| {
             let mut asking = interrupt.map(Interruption);
-            members.with(index, (None, interrupt), |run| match &mut asking {
+            members.with(index, (MemberSteps::Own, interrupt), |run| match &mut asking {
                 Some(asking) => work(index, run.observe(asking)),
                 None => work(index, run),
             })

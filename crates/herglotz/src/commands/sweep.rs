@@ -161,10 +161,11 @@ impl Sweep {
                 }
             }
         }
-        let Tally { completed, stopped, failed, unresolved, .. } = tally;
+        let Tally { completed, stopped, failed, unresolved, own_plans, .. } = tally;
         if self.json {
             let summary = serde_json::json!({
                 "members": written, "completed": completed, "stopped": stopped, "failed": failed, "unresolved": unresolved,
+                "own_plans": own_plans,
             });
             print_json(&summary)?;
         } else {

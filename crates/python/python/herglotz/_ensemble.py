@@ -185,13 +185,15 @@ class Ensemble:
         Errors and warnings, by the index of the member; values that were not computed are NaN.
     batch_kernel : int
         The number of members that were advanced together in SIMD lanes.
+    own_plans : int
+        With an accuracy, the number of the other members: their steps were selected for each by itself.
     """
 
     def __init__(self, system, record, event_names, observed, request):
         self.system, self._request = system, request
         events = request[6]
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
-        self.troubles, self.batch_kernel = dict(record.troubles), record.batch_kernel
+        self.troubles, self.batch_kernel, self.own_plans = dict(record.troubles), record.batch_kernel, record.own_plans
         count, n = len(record.t), system.dimension
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))

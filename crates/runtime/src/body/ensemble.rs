@@ -107,11 +107,11 @@ impl BodyEnsemble<'_> {
         while first < self.count {
             let members = first..self.count.min(first + MEMBERS_PER_THREAD * threads);
             first = members.end;
-            for member in self.block(members, threads) {
+            for (member, planned) in self.block(members, threads) {
                 if self.is_interrupted() {
                     return Ok(tally);
                 }
-                count(&mut tally, &member);
+                count(&mut tally, &member, planned);
                 if hand_on(member).is_break() {
                     return Ok(tally);
                 }
@@ -124,8 +124,9 @@ impl BodyEnsemble<'_> {
         self.interrupt.as_ref().is_some_and(Interrupt::is_wanted)
     }
 
-    /// Runs some members on several threads, the calling thread among them.
-    fn block(&self, members: Range<usize>, threads: usize) -> Vec<BodyMember> {
+    /// Runs some members on several threads, the calling thread among them. With each, whether its steps were selected
+    /// for it.
+    fn block(&self, members: Range<usize>, threads: usize) -> Vec<(BodyMember, bool)> {
         let next = AtomicUsize::new(members.start);
         let work = || {
             let mut done = Vec::new();
@@ -150,23 +151,25 @@ impl BodyEnsemble<'_> {
             }
             all
         });
-        all.sort_by_key(|member| member.index);
+        all.sort_by_key(|(member, _)| member.index);
         all
     }
 
-    fn run_member(&self, index: usize) -> BodyMember {
+    fn run_member(&self, index: usize) -> (BodyMember, bool) {
         let (body, motion) = (self.member)(index);
         // The trial runs of the member are interrupted too.
         let motion = BodyMotion { interrupt: self.interrupt.clone().or(motion.interrupt.clone()), ..motion };
         let mut record = Record { rows: Vec::new(), crossings: Vec::new(), interrupt: self.interrupt.as_ref() };
         let outcome = body.run(&motion, &mut record);
-        BodyMember { index, outcome, rows: record.rows, crossings: record.crossings }
+        let planned = matches!(motion.step_control, StepControl::Accuracy { .. });
+        (BodyMember { index, outcome, rows: record.rows, crossings: record.crossings }, planned)
     }
 }
 
-/// Counts a member by the way in which it ended.
-fn count(tally: &mut Tally, member: &BodyMember) {
+/// Counts a member by the way in which it ended, and by whether its steps were selected for it.
+fn count(tally: &mut Tally, member: &BodyMember, planned: bool) {
     tally.members += 1;
+    tally.own_plans += usize::from(planned);
     match member.outcome.as_ref().map(|outcome| outcome.status) {
         Ok(GroupStatus::Completed) => tally.completed += 1,
         Ok(GroupStatus::Event { .. } | GroupStatus::Stopped { .. }) => tally.stopped += 1,

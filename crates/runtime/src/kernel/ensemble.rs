@@ -109,6 +109,8 @@ fn run_members(system: &dyn ManyMotions, block: &Block<'_>, results: &mut Result
             Err(EnsembleError::Member { cause, .. }) => {
                 results.tally.members += 1;
                 results.tally.failed += 1;
+                let planned = matches!(ensemble.step_control, StepControl::Accuracy { .. });
+                results.tally.own_plans += usize::from(planned);
                 results.tally.first_failed = results.tally.first_failed.or(Some(index));
                 let member = MemberEnd { index, ending: Err(cause), rows: Vec::new(), crossings: Vec::new() };
                 results.ended = results.monitor.member(member).is_break();
@@ -222,6 +224,7 @@ impl Results<'_> {
         self.tally.failed += of_block.failed;
         self.tally.unresolved += of_block.unresolved;
         self.tally.batch_kernel += of_block.batch_kernel;
+        self.tally.own_plans += of_block.own_plans;
         let first_failed = of_block.first_failed.map(|index| block.members.start + index);
         self.tally.first_failed = self.tally.first_failed.or(first_failed);
     }

@@ -2,7 +2,8 @@
 
 use super::{free, motion};
 use herglotz_runtime::{
-    Body, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, GroupStatus, Interrupt, OutputTimes, RuntimeError, Tally,
+    Body, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, GroupStatus, Interrupt, OutputTimes, RuntimeError,
+    StepControl, Tally,
 };
 use std::ops::ControlFlow;
 
@@ -38,7 +39,7 @@ fn run(threads: usize) -> (Tally, Vec<BodyMember>) {
 fn members_do_not_depend_on_threads() {
     let (tally, one) = run(1);
     assert_eq!((tally.members, tally.completed, tally.stopped, tally.failed), (COUNT, COUNT - 2, 1, 1));
-    assert_eq!((tally.first_failed, one.len()), (Some(3), COUNT));
+    assert_eq!((tally.first_failed, tally.own_plans, one.len()), (Some(3), 0, COUNT));
     for (i, member_of) in one.iter().enumerate() {
         let (body, request) = member(i);
         assert_eq!(member_of.index, i);
@@ -73,6 +74,12 @@ fn ensembles_end_and_are_refused() {
         if member.index == 9 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert_eq!((tally.unwrap().members, seen), (10, 10));
+    let accurate = |i: usize| {
+        let (body, motion) = member(i);
+        (body, BodyMotion { step_control: StepControl::Accuracy { error: 1e-6, by: None }, ..motion })
+    };
+    let accurate = BodyEnsemble { count: 2, member: &accurate, ..good() };
+    assert_eq!(accurate.run(&mut |_| ControlFlow::Continue(())).unwrap().own_plans, 2);
     let interrupt = Some(Interrupt::when(|| true));
     let interrupted = BodyEnsemble { interrupt, ..good() };
     assert_eq!(interrupted.run(&mut |_| ControlFlow::Continue(())).unwrap().members, 0);

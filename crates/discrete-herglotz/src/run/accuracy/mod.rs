@@ -25,4 +25,4 @@ mod trial_end;
 mod trial_runs;
 mod velocities;
 
-pub(crate) use select::select_steps;
+pub(crate) use select::{select_equal_steps, select_steps};

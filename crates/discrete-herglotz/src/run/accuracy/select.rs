@@ -67,6 +67,29 @@ pub(crate) fn select_steps<'p>(
     Ok(select(&part)?.extended_by(request.span / span))
 }
 
+/// Selects equal steps of the given integrator, for motions that take them together. The search ends with an error where
+/// that of a single run would turn to divided steps: equal ones would be many times more.
+pub(crate) fn select_equal_steps<'p>(
+    request: &Request<'p>,
+    wanted: f64,
+    collocation: Collocation<'p>,
+    _terminal: Option<Terminal<'_>>,
+) -> Result<StepSelection<'p>, InputError> {
+    if !(wanted > 0.0 && wanted.is_finite()) {
+        return Err(InputError::Tolerance { wanted });
+    }
+    let mut trials = TrialRuns::new(request, wanted, collocation);
+    trials.tests_uneven_steps = may_divide(request);
+    select_within_budget(&mut trials).map_err(|refused| request.by_rounding_of_velocity(refused))
+}
+
+/// Whether steps may be divided. Divided steps that end at an unknown kink could agree on a wrong motion, so all kinks
+/// must be known. Those of a Hamiltonian have no derivatives.
+fn may_divide(request: &Request<'_>) -> bool {
+    let hints = request.problem.system.hints();
+    (hints.proved || hints.switching_functions) && !(request.needs.derivatives && hints.hamiltonian)
+}
+
 /// The selection with a given budget.
 pub(crate) fn select_within_budget<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection<'p>, InputError> {
     let wanted = trials.wanted;
@@ -89,16 +112,12 @@ pub(crate) fn select_within_budget<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result
 /// The selection if no integrator is given.
 fn select_integrator<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSelection<'p>, InputError> {
     let collocation = trials.collocation.clone();
-    let hints = trials.request.problem.system.hints();
-    let derivatives = trials.request.needs.derivatives;
-    // Divided steps of a Hamiltonian and steps in transformed time have no derivatives.
-    let divides = (hints.proved || hints.switching_functions) && !(derivatives && hints.hamiltonian);
+    let divides = may_divide(trials.request);
     let mut stages = stages_along(trials.request, trials.wanted);
-    let transforms = hints.time_transformation && !derivatives;
+    // Steps in transformed time have no derivatives.
+    let transforms = trials.request.problem.system.hints().time_transformation && !trials.request.needs.derivatives;
     trials.tests_transformation = transforms && trials.request.problem.structure.autonomous;
     trials.tests_newton_steps = stages > DEFAULT_STAGES;
-    // Divided steps that end at an unknown kink could agree on a wrong motion: steps are divided only if all kinks are
-    // known.
     trials.tests_uneven_steps = divides;
     let mut found = by_equal_steps(trials, &collocation.gauss(stages), stages);
     trials.tests_newton_steps = false;
