@@ -4,12 +4,16 @@
 
 #[path = "body/accuracy.rs"]
 mod accuracy;
+#[path = "body/closed_form.rs"]
+mod closed_form;
 #[path = "body/ensembles.rs"]
 mod ensembles;
 #[path = "body/plans.rs"]
 mod plans;
 #[path = "body/resume.rs"]
 mod resume;
+#[path = "body/separatrix.rs"]
+mod separatrix;
 
 use herglotz_runtime::{
     Body, BodyEvent, BodyMotion, Crossing, Direction, GroupStatus, OutputTimes, RunMonitor, RuntimeError, StepControl,

@@ -13,7 +13,7 @@ mod output;
 #[path = "pairs/problem.rs"]
 mod problem;
 #[path = "pairs/random.rs"]
-mod random;
+pub mod random;
 #[path = "pairs/reference.rs"]
 mod reference;
 

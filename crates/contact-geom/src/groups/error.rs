@@ -153,16 +153,19 @@ pub enum GroupError {
     Interrupted,
     /// An accuracy is not positive, or is not reached.
     #[error(
-        "the accuracy {requested:e} is not reached{}; it must be a positive number above round-off", if *steps > 0 {
-            format!(": {steps} steps reach {reached:e}, and more are not better")
+        "the accuracy {requested:e} {}", if *steps > 0 {
+            format!(
+                "is not reached: with {steps} steps the roundings grow to {reached:e} at the end, and more steps are not \
+                 better; request a larger error or choose a shorter time"
+            )
         } else {
-            String::new()
+            "must be a positive number".to_owned()
         }
     )]
     Accuracy {
         /// The accuracy that was requested.
         requested: f64,
-        /// The smallest difference of two runs.
+        /// The smallest difference of two runs, or that of runs with other roundings.
         reached: f64,
         /// The number of steps that reach it; 0 if there is none.
         steps: usize,

@@ -127,6 +127,21 @@ impl<G: LieGroup<N>, const N: usize> GroupMotion<G, N> {
         Ok(())
     }
 
+    /// Changes each component of the momentum, in space and in the body, by half a unit in its last place up or down, as other
+    /// roundings would; the signs are those of random numbers (Marsaglia, Xorshift RNGs, 2003). A component that is 0 has no
+    /// rounding.
+    pub(super) fn round_otherwise(&mut self, random: &mut u64) {
+        let mut rounded = |x: f64| {
+            *random ^= *random << 13;
+            *random ^= *random >> 7;
+            *random ^= *random << 17;
+            if *random >> 63 == 0 { 0.5 * f64::EPSILON * x } else { -0.5 * f64::EPSILON * x }
+        };
+        let in_space = self.spatial.map(&mut rounded);
+        let in_body = G::coadjoint(&self.g, &self.spatial).map(&mut rounded);
+        self.spatial += in_space + G::coadjoint(&G::inverse(&self.g), &in_body);
+    }
+
     /// The body velocity at the present time as the last step extrapolates it; `None` before the first step.
     pub(super) fn last_velocity(&self) -> Option<SVector<f64, N>> {
         self.velocity

@@ -96,7 +96,10 @@ impl Body {
         entries.push(match motion.step_control {
             StepControl::Accuracy { error, .. } => PlanEntry::computed(
                 what,
-                format!("the number of steps is doubled until two runs agree to the accuracy {error:e} at the end"),
+                format!(
+                    "the number of steps is doubled until two runs agree to the accuracy {error:e} at the end, and two \
+                     more with other roundings show how these grow"
+                ),
             ),
             StepControl::Steps { .. } => PlanEntry::skipped(what, "the steps are given; their error is not estimated"),
         });

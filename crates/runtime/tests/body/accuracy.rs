@@ -5,7 +5,7 @@ use herglotz_runtime::{Body, BodyMotion, BodyTorque, GroupStatus, InputError, In
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-fn accurate(omega: [f64; 3], end: f64, error: f64) -> BodyMotion {
+pub fn accurate(omega: [f64; 3], end: f64, error: f64) -> BodyMotion {
     BodyMotion::new([1.0, 0.0, 0.0, 0.0], omega, end, StepControl::Accuracy { error, by: None })
 }
 
