@@ -4,6 +4,7 @@ use super::accuracy::accurate;
 use super::closed_form::{FreeBody, turn};
 use crate::pairs::random::Random;
 use herglotz_runtime::{Body, BodyMotion};
+use std::f64::consts::TAU;
 
 const IDENTITY: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
 
@@ -82,7 +83,7 @@ fn answers_are_within_the_accuracy_or_refused() {
         let small = [0, 1].map(|_| random.sign() * 10.0_f64.powf(random.between(-7.0, -1.0)));
         // On the separatrix I_1 (I_2 - I_1) omega_1^2 = I_3 (I_3 - I_2) omega_3^2.
         let slope = (i1 * (i2 - i1) / (i3 * (i3 - i2))).sqrt();
-        let (sin, cos) = random.between(0.0, 6.28).sin_cos();
+        let (sin, cos) = random.between(0.0, TAU).sin_cos();
         let kind = random.below(3);
         let omega = match kind {
             0 => [small[0], random.sign(), small[1]],
