@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
-use herglotz_runtime::{Motion, Outcome, Start, Status, StepControl, Steps, System};
+use herglotz_runtime::{Interrupt, Motion, Outcome, Start, Status, StepControl, Steps, System};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn accurate(error: f64) -> StepControl {
     StepControl::Accuracy { error, by: None }
@@ -49,4 +51,23 @@ fn divided_steps_see_a_kink_beyond_their_outermost_samples() {
             assert!(error <= 4.0 * max_defect, "{steps} steps, {max_defect:e}: {error:e}");
         }
     }
+}
+
+/// Equal steps that pass a tip beside their nodes converge like the step: they are divided there after some hundred, not after
+/// millions.
+#[test]
+fn a_motion_through_a_tip_is_planned_soon() {
+    let system = System::parse("(x'^2 + y'^2)/2 + 1/(hypot(x, y) + 1)", &["x", "y"], &[]).unwrap();
+    let asked = Arc::new(AtomicUsize::new(0));
+    let counter = asked.clone();
+    let interrupt = Interrupt::when(move || {
+        counter.fetch_add(1, Ordering::Relaxed);
+        false
+    });
+    let motion = Motion::new(Start::new(0.0, [1.0, 0.0], [0.0, 0.0], 0.0), 10.0, accurate(1e-9));
+    let plan = system.plan(&Motion { interrupt: Some(interrupt), ..motion }).unwrap();
+    assert!(plan.integrator.name.starts_with("divided_gauss"), "{}", plan.integrator.name);
+    // It is asked every 16 steps of a trial run.
+    let steps = 16 * asked.load(Ordering::Relaxed);
+    assert!(steps <= 1 << 14, "{steps} steps");
 }

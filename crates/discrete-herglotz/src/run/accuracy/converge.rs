@@ -249,6 +249,10 @@ pub(crate) fn converge(
         };
         (best, before) = (if error < best { error } else { best }, error);
         nearest = if apart < nearest { apart } else { nearest };
+        // The defect of a step over a kink that is not known falls with the step only.
+        if trials.tests_uneven_steps && !falls && k >= MIN_RATIO_FOR_DIVISION * first {
+            return Err(Ended::Switch { reason: SwitchReason::Divided, otherwise: failed(nearest, cause) });
+        }
         // No run is started that the budget would not complete.
         let affordable = trials.left.max(trials.reserve);
         if stagnations == MAX_STAGNATIONS || 2 * (left - trials.reserve) > affordable {
