@@ -137,13 +137,17 @@ pub enum GroupError {
     },
     /// The trial runs for an accuracy take too many steps.
     #[error(
-        "the accuracy {requested:e} is not reached: two runs with up to {steps} steps differ by {reached:e}, and the number \
-         of steps of trial runs is bounded; request a larger error, choose a shorter time, or give the steps"
+        "the accuracy {requested:e} is not reached: {}, and the number of steps of trial runs is bounded; request a larger \
+         error, choose a shorter time, or give the steps", if reached.is_finite() {
+            format!("three runs with up to {steps} steps differ by {reached:e}")
+        } else {
+            format!("no three runs with up to {steps} steps can be compared")
+        }
     )]
     Budget {
         /// The accuracy that was requested.
         requested: f64,
-        /// The smallest difference of two runs; infinite if there is none.
+        /// The smallest number by which three runs, each with twice as many steps, differ; infinite if there is none.
         reached: f64,
         /// The number of steps of the last run.
         steps: usize,
@@ -165,7 +169,8 @@ pub enum GroupError {
     Accuracy {
         /// The accuracy that was requested.
         requested: f64,
-        /// The smallest difference of two runs, or that of runs with other roundings.
+        /// The smallest number by which three runs, each with twice as many steps, differ, or the difference of runs with
+        /// other roundings.
         reached: f64,
         /// The number of steps that reach it; 0 if there is none.
         steps: usize,

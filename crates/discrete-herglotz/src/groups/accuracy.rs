@@ -11,8 +11,9 @@ pub struct GroupSteps {
     pub steps: usize,
     /// Their length.
     pub h: f64,
-    /// The difference at the end from a run with half as many steps, by [`group_distance`], or from runs with other
-    /// roundings, if that is larger: a bound of the error.
+    /// The difference at the end from a run with half as many steps, by [`group_distance`]: a bound of the error, which
+    /// is smaller by about `2^order - 1`. Where round-off is of the size of the accuracy, the largest difference of three
+    /// runs, or that from runs with other roundings, if it is larger.
     pub error: f64,
 }
 
@@ -69,6 +70,9 @@ fn growth_of_roundings<G: LieGroup<N>, const N: usize>(
 /// two runs differ by at most `accuracy`, and by at most half as much as the two runs before: steps that are too long for
 /// the motion may agree by chance. A step that fails is divided like one that is not accurate.
 ///
+/// Where the differences do not fall any more, what is left of them is round-off, and three runs, each with twice as many
+/// steps as the one before, must differ by at most `accuracy`.
+///
 /// All runs have the roundings of the start in common, and near a separatrix these grow: two runs may agree on a wrong end.
 /// Where the runs first resolve the motion, two more with other roundings show their growth, and the accuracy is refused
 /// if it is smaller.
@@ -91,12 +95,14 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
     }
     let mut last: Result<GroupState<G, N>, GroupError> = Err(GroupError::Step { h: span });
     // The difference before is not a number for the first two runs, and after one that failed.
-    let (mut smallest, mut stagnant, mut best, mut before) = (f64::INFINITY, 0, 0, f64::NAN);
+    let (mut smallest, mut stagnant, mut before) = (f64::INFINITY, 0, f64::NAN);
+    // The steps for which three runs in a row differ least: two may agree by chance.
+    let mut best = GroupSteps { steps: 0, h: span, error: f64::INFINITY };
     let (mut count, mut spent) = (steps.max(1), 0usize);
     // The distance at the end that is due to roundings, where it is known.
     let mut growth = None;
     // Whether the accuracy is expected to be reached.
-    let mut promising = false;
+    let (mut promising, mut is_round_off) = (false, false);
     while count <= MAX_STEPS && (promising || spent + count <= BUDGET) {
         let h = span / count as f64;
         let method = integrator(h)?;
@@ -111,9 +117,10 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
             (Ok(coarse), Ok(fine)) => {
                 // Two runs may agree in all digits, but their round-off is not 0.
                 let error = max_or_nan(group_distance(coarse, fine), f64::EPSILON);
-                let last_difference = before;
-                let falls = error <= 0.5 * before || max_or_nan(error, before) <= 0.01 * accuracy;
-                if growth.is_none() && falls && error <= max_or_nan(RESOLVED, accuracy) {
+                let of_three = max_or_nan(error, before);
+                let falls = error <= 0.5 * before || of_three <= 0.01 * accuracy;
+                let resolves = (falls || of_three <= accuracy) && error <= max_or_nan(RESOLVED, accuracy);
+                if growth.is_none() && resolves {
                     let found = growth_of_roundings(start, &integrator(2.0 * h)?, count / 2, coarse)?;
                     if found > accuracy || found.is_nan() {
                         return Err(GroupError::Accuracy { requested: accuracy, reached: found, steps: count / 2 });
@@ -124,20 +131,22 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
                 // The number of doublings after which the differences, which fall by this factor, are small enough.
                 let doublings = ((error / accuracy).ln() / (before / error).ln()).ceil();
                 promising = error <= 0.5 * before && count as f64 * doublings.exp2() <= MAX_STEPS as f64;
+                if of_three < best.error {
+                    best = GroupSteps { steps: count, h, error: of_three };
+                }
                 before = error;
                 // Where the differences have stopped falling, they are round-off that the motion has enlarged, and one of
                 // them may be small by chance.
-                let certain = stagnant == 0 || max_or_nan(error, last_difference) <= 0.1 * accuracy;
+                let certain = stagnant == 0 || of_three <= 0.1 * accuracy;
                 if error <= accuracy && falls && certain {
                     return Ok(GroupSteps { steps: count, h, error: max_or_nan(error, growth.unwrap_or(0.0)) });
                 }
                 stagnant = if error < 0.5 * smallest { 0 } else { stagnant + 1 };
-                if error < smallest {
-                    (smallest, best) = (error, count);
-                }
+                smallest = if error < smallest { error } else { smallest };
                 // At round-off more steps do not help.
                 if stagnant >= 3 && smallest < 1e-6 {
-                    return Err(GroupError::Accuracy { requested: accuracy, reached: smallest, steps: best });
+                    is_round_off = true;
+                    break;
                 }
             }
             _ => before = f64::NAN,
@@ -145,9 +154,12 @@ pub fn group_steps<G: LieGroup<N>, I: GroupIntegrator<G, N>, const N: usize>(
         last = end;
         count = count.saturating_mul(2);
     }
-    // Where no run succeeded, a step failed.
+    let reached = best.error;
     match last {
+        // Where no run succeeded, a step failed.
         Err(error) if smallest == f64::INFINITY => Err(error),
-        _ => Err(GroupError::Budget { requested: accuracy, reached: smallest, steps: count / 2 }),
+        _ if reached <= accuracy => Ok(GroupSteps { error: max_or_nan(reached, growth.unwrap_or(0.0)), ..best }),
+        _ if is_round_off => Err(GroupError::Accuracy { requested: accuracy, reached, steps: best.steps }),
+        _ => Err(GroupError::Budget { requested: accuracy, reached, steps: count / 2 }),
     }
 }

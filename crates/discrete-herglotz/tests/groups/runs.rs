@@ -127,6 +127,30 @@ fn steps_for_an_accuracy() {
     assert!(matches!(refused, Err(GroupError::Accuracy { reached, .. }) if reached < 1e-14), "{refused:?}");
 }
 
+/// An accuracy near the round-off of the runs is either reached or refused with a larger difference, wherever their round-off
+/// lies: here it is enlarged by the spins about an unstable axis.
+#[test]
+fn an_accuracy_that_is_reached_is_not_refused() {
+    let body = tilted(0.0);
+    let mut refusals = 0;
+    for span in [1.5, 20.0] {
+        let motion = GroupMotion::new(0.0, start()).unwrap();
+        let method = |h: f64| GroupGauss::new(body, 4, h);
+        for k in 0..60 {
+            let accuracy = 10.0_f64.powf(-13.0 - 0.05 * f64::from(k));
+            match group_steps(&motion, span, accuracy, 8, method) {
+                Ok(found) => assert!(found.error <= accuracy, "{accuracy:e}: {found:?}"),
+                Err(GroupError::Accuracy { reached, .. }) => {
+                    refusals += 1;
+                    assert!(reached > accuracy, "{accuracy:e} is not reached: {reached:e}");
+                }
+                Err(error) => panic!("{accuracy:e}: {error}"),
+            }
+        }
+    }
+    assert!(refusals > 0);
+}
+
 /// Runs that cannot be taken are refused by name; a failing step keeps what was computed.
 #[test]
 fn runs_that_fail() {
