@@ -12,6 +12,7 @@ use crate::run::accuracy::trial_end::TrialEnd;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::{MAX_STEPS, StepSelection};
 use crate::{InputError, SelectionFailure};
+use contact_geom::numbers::max_or_nan;
 
 /// The steps of an integrator for the requested error, without a reference: three runs, each with twice as many steps as
 /// the one before, must agree better and better, at least as with half the order of the method. The distance of two runs
@@ -36,6 +37,8 @@ pub(crate) fn by_doubled_steps<'p>(
     let (mut known, mut before, mut best, mut stagnations): (Option<Track>, _, _, _) =
         (None, f64::INFINITY, f64::INFINITY, 0);
     let mut cause = SelectionFailure::Budget;
+    // The steps for which three runs in a row differ least.
+    let mut nearest = (f64::INFINITY, 0);
     for _ in 0..MAX_ITERATIONS {
         if count as f64 > MAX_STEPS {
             break;
@@ -61,6 +64,8 @@ pub(crate) fn by_doubled_steps<'p>(
                     cause =
                         if round_off { SelectionFailure::RoundOff } else { SelectionFailure::Order { order: shown } };
                 }
+                let of_three = max_or_nan(before, apart);
+                nearest = if of_three < nearest.0 { (of_three, count) } else { nearest };
                 (best, before) = (best.min(apart), apart);
                 if stagnations == MAX_STAGNATIONS_FROM_REFERENCE {
                     break;
@@ -78,5 +83,9 @@ pub(crate) fn by_doubled_steps<'p>(
         }
         count *= 2;
     }
-    Err(InputError::Accuracy { wanted, reached: best, cause })
+    // Runs that differ by round-off do not agree better and better, but this is their error.
+    match nearest {
+        (error, count) if error <= wanted => Ok(selected(count, error)),
+        _ => Err(InputError::Accuracy { wanted, reached: best, cause }),
+    }
 }

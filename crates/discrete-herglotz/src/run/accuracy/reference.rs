@@ -5,7 +5,7 @@ use crate::run::accuracy::converge::{Converged, selected};
 use crate::run::accuracy::limits::{
     FACTOR_AFTER_FAILURE, FEWER_STEPS, MAX_DISTANCE_FROM_REFERENCE, MAX_ITERATIONS, MAX_ROUND_OFF,
     MAX_STAGNATING_RATIO, MAX_STAGNATIONS_FROM_REFERENCE, MIN_DISTANCE_FROM_REFERENCE, MORE_STEPS,
-    PREDICTED_DISTANCE_FROM_REFERENCE, PREDICTION_MARGIN, REFERENCE_STAGES,
+    PREDICTED_DISTANCE_FROM_REFERENCE, PREDICTION_MARGIN, REFERENCE_ERROR, REFERENCE_STAGES,
 };
 use crate::run::accuracy::trial_end::TrialEnd;
 use crate::run::accuracy::trial_runs::TrialRuns;
@@ -24,7 +24,8 @@ pub(crate) fn by_reference<'p>(
     let goal = PREDICTED_DISTANCE_FROM_REFERENCE * wanted;
     let refuse = |reached, cause| Err(InputError::Accuracy { wanted, reached, cause });
     let mut count = whole((found.k * REFERENCE_STAGES) as f64 / order.min(4.0));
-    let (mut best, mut stagnations) = (f64::INFINITY, 0);
+    // The smallest distance from the reference, and the number of steps with it.
+    let (mut best, mut stagnations) = ((f64::INFINITY, 0), 0);
     let (mut cause, mut before) = (SelectionFailure::Budget, None);
     // The smallest number of steps that was found to be sufficient, with its error.
     let mut enough: Option<(usize, f64)> = None;
@@ -50,7 +51,7 @@ pub(crate) fn by_reference<'p>(
                 if enough.is_some() {
                     break;
                 }
-                stagnations = if error < MAX_STAGNATING_RATIO * best { 0 } else { stagnations + 1 };
+                stagnations = if error < MAX_STAGNATING_RATIO * best.0 { 0 } else { stagnations + 1 };
                 // The reference has converged, so the cause is not chaos.
                 if let Some((n, other)) = before.replace((count, error)) {
                     let shown = f64::ln(other / error) / f64::ln(count as f64 / n as f64);
@@ -58,7 +59,7 @@ pub(crate) fn by_reference<'p>(
                     cause =
                         if round_off { SelectionFailure::RoundOff } else { SelectionFailure::Order { order: shown } };
                 }
-                best = best.min(error);
+                best = if error < best.0 { (error, count) } else { best };
                 if stagnations == MAX_STAGNATIONS_FROM_REFERENCE {
                     break;
                 }
@@ -85,8 +86,10 @@ pub(crate) fn by_reference<'p>(
         };
         count = whole(count as f64 * factor);
     }
-    match enough {
+    // With the error of the reference, at the level of round-off too.
+    let reached = best.0 + REFERENCE_ERROR * wanted;
+    match enough.or((reached <= wanted).then_some((best.1, reached))) {
         Some((count, error)) => Ok(selected(trials, integrator, count, error, found)),
-        None => refuse(best, cause),
+        None => refuse(reached, cause),
     }
 }
