@@ -277,7 +277,7 @@ SAID = {
         lambda: hz.solve(
             "x'^2/2 - abs(x)", [1.0], [0.0], 1.0, coordinates=["x"], integrator="midpoint", steps=10
         ).sensitivity("x"),
-        "not implemented; Gauss methods such as \"gauss_8\" have those in all variables, splittings and quadrature rules",
+        "not implemented; choose a Gauss method such as \"gauss_8\"",
     ),
     "a terminal event": (
         lambda: pendulum(10.0, events=hz.Event("x", terminal=True)).sensitivity("gamma"),

@@ -262,7 +262,7 @@ pub fn in_words(error: &InputError) -> String {
         ),
         InputError::Unsaved => "this integrator does not support checkpoints; choose another integrator".to_owned(),
         InputError::Forced { method } => format!(
-            "there is a force that {method} does not take; choose a Gauss method such as \"gauss_8\", or write the force \
+            "there is a force that {method} does not take; choose a Gauss method such as \"gauss_4\", or write the force \
              into the Lagrangian"
         ),
         InputError::NoIntegrator => "steps are given without an integrator; give one".to_owned(),

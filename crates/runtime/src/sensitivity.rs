@@ -39,10 +39,12 @@ pub type Loss<'l> = dyn FnMut(&[MotionState]) -> (f64, Vec<EndCovector>) + 'l;
 pub(crate) fn in_words(error: &SensitivityError) -> String {
     match error {
         SensitivityError::Input(error) => crate::in_words(error),
+        SensitivityError::NoTangent { method, case: "" } => format!(
+            "derivatives of motions by {method} are not implemented; Gauss methods such as \"gauss_8\" have those in all \
+             variables, and splittings and quadrature rules in most"
+        ),
         SensitivityError::NoTangent { method, case } => format!(
-            "derivatives of motions by {method}{case} are not implemented; Gauss methods such as \"gauss_8\" have those in all \
-             variables, splittings and quadrature rules such as \"strang\" and \"midpoint\" in most, the latter for a Lagrangian \
-             without kinks, jumps and resets along the motion"
+            "derivatives of motions by {method}{case} are not implemented; choose a Gauss method such as \"gauss_8\""
         ),
         error => error.to_string(),
     }

@@ -194,6 +194,12 @@ pub enum InputError {
         /// The hypothesis.
         hypothesis: &'static str,
     },
+    /// A problem under constraints has switching functions or breaks.
+    #[error(
+        "the Lagrangian or the force has kinks or jumps, and steps under constraints do not end on them; smooth it, or choose \
+         coordinates in which the constraints are solved"
+    )]
+    KinksUnderConstraints,
     /// The pieces of a splitting do not sum to the contact Hamiltonian.
     #[error(
         "the pieces of the splitting do not sum to the contact Hamiltonian: near the start they differ by {size:e}, \

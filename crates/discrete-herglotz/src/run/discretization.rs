@@ -57,8 +57,7 @@ impl<'p> Discretization<'p> {
             return Err(InputError::Hypothesis { hypothesis });
         }
         if switches && info.constrained {
-            let hypothesis = "a Lagrangian without kinks and jumps, since steps under constraints do not end on them";
-            return Err(InputError::Hypothesis { hypothesis });
+            return Err(InputError::KinksUnderConstraints);
         }
         Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches, parts })
     }

@@ -351,7 +351,7 @@ impl Scene {
                 | E::NoTimeTransformation
                 | E::Forced { .. }
                 | E::Stages { .. } => spans.integrator,
-                E::FalseClaim { .. } => spans.lagrangian,
+                E::FalseClaim { .. } | E::KinksUnderConstraints => spans.lagrangian,
                 E::Times { .. } => spans.rows,
                 E::Constraint(_)
                 | E::Undefined

@@ -4,7 +4,7 @@ use super::integrator::{BodyIntegrator, BodyMethod, ForcedBody, with_ends};
 use super::run::Prepared;
 use super::steps::of_integrator;
 use super::{Body, BodyMotion};
-use crate::RuntimeError;
+use crate::{RuntimeError, StepControl};
 use contact_geom::groups::Rotations;
 use contact_geom::nalgebra::{DMatrix, Matrix3, Vector3};
 use discrete_herglotz::AnyIntegrator;
@@ -68,13 +68,17 @@ impl Body {
     /// Those of [`run`](Self::run); [`RuntimeError::Argument`] for a splitting, whose derivatives in the inertia are not
     /// known, and for a step that fails.
     pub fn derivatives(&self, motion: &BodyMotion) -> Result<BodyDerivatives, RuntimeError> {
-        let Prepared { by, steps, step_size, state, rows, .. } = self.prepare(motion)?;
+        let named = match motion.step_control {
+            StepControl::Steps { by, .. } => Some(by),
+            StepControl::Accuracy { by, .. } => by,
+        };
+        // The advice for a motion that another integrator cannot take would name those without derivatives.
+        let Prepared { by, steps, step_size, state, rows, .. } = match named {
+            Some(by) if !matches!(by, AnyIntegrator::Gauss { .. }) => return Err(without_derivatives(by)),
+            _ => self.prepare(motion)?,
+        };
         let AnyIntegrator::Gauss { stages } = by else {
-            let why = format!(
-                "is \"{by}\", whose derivatives in the parameters are not known; derivatives take a Gauss method such as \
-                 \"gauss_4\""
-            );
-            return Err(RuntimeError::argument("integrator", why));
+            return Err(without_derivatives(by));
         };
         let body = ForcedBody { lagrangian: rows.lagrangian, force: self.torque.clone() };
         let gauss = GroupGauss::new::<Rotations, 3>(body.clone(), stages, step_size);
@@ -143,4 +147,12 @@ struct Tangent {
     weight: Vector3<f64>,
     centre: Vector3<f64>,
     gamma: f64,
+}
+
+/// The error of an integrator that has no derivatives.
+fn without_derivatives(by: AnyIntegrator) -> RuntimeError {
+    let why = format!(
+        "is \"{by}\", whose derivatives in the parameters are not known; derivatives take a Gauss method such as \"gauss_4\""
+    );
+    RuntimeError::argument("integrator", why)
 }

@@ -87,13 +87,13 @@ impl BodyMethod {
             AnyIntegrator::Gauss { .. } | AnyIntegrator::Splitting(_) | AnyIntegrator::Discrete(Method::Strang) => {
                 Ok(())
             }
-            other => Err(RuntimeError::argument(
-                "integrator",
-                format!(
-                    "is \"{other}\", but a rigid body is integrated by a Gauss method such as \"gauss_4\" or by a \
-                     splitting such as \"sofroniou_spaletta_10\""
-                ),
-            )),
+            other => {
+                let splitting = if is_forced { "" } else { " or by a splitting such as \"sofroniou_spaletta_10\"" };
+                let why = format!(
+                    "is \"{other}\", but this rigid body is integrated by a Gauss method such as \"gauss_4\"{splitting}"
+                );
+                Err(RuntimeError::argument("integrator", why))
+            }
         }
     }
 }

@@ -249,6 +249,7 @@ fn is_common(cause: &InputError) -> bool {
             | E::Hypothesis { .. }
             | E::NoTimeTransformation
             | E::Forced { .. }
+            | E::KinksUnderConstraints
     )
 }
 

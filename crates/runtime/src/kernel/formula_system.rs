@@ -69,6 +69,11 @@ pub(super) trait FormulaSystem<const N: usize>:
     fn symmetries(&self) -> Vec<Symmetry<N>>;
 }
 
+/// The hypothesis of an integrator on a motion with constraints that splittings do not take, since a force acts or the
+/// Lagrangian is not separable.
+const METHODS_OF_ANY_MOTION: &str = "a motion without constraints; for this one there are \"gauss_1\" to \"gauss_7\", \
+                                     which stand for contact Lobatto methods of the same orders";
+
 impl<const N: usize> Observed for FormulaLagrangian<N> {
     fn formula(&self) -> &Formula {
         self.formula()
@@ -111,7 +116,15 @@ impl<const N: usize> FormulaSystem<N> for FormulaLagrangian<N> {
     }
 
     fn constrained(&self, by: Option<AnyIntegrator>) -> Result<Option<OfConstraints>, InputError> {
-        (self.formula().constraints() > 0).then(|| OfConstraints::named(self, by)).transpose()
+        if self.formula().constraints() == 0 {
+            return Ok(None);
+        }
+        match by {
+            None | Some(AnyIntegrator::Gauss { stages: 1..=7 } | AnyIntegrator::Splitting(_)) => {}
+            Some(_) if self.proved().separable && !Lagrangian::has_force(self) => {}
+            Some(_) => return Err(InputError::Hypothesis { hypothesis: METHODS_OF_ANY_MOTION }),
+        }
+        OfConstraints::named(self, by).map(Some)
     }
 
     fn projected(&self, t: f64, at: VelocityPoint<N>) -> Result<VelocityPoint<N>, InputError> {

@@ -6,10 +6,11 @@ use crate::common::gauss::GaussSteppers;
 use crate::lagrangians::{One, one};
 use contact_examples::systems::constrained::RigidPendulum;
 use contact_examples::systems::{CoupledInZ, Kepler, Pendulum};
+use contact_geom::constraints::Constraint;
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{
-    ContactHamiltonian, DiscretePoint, Forced, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityDrag,
-    VelocityPoint,
+    ContactHamiltonian, DiscretePoint, Forced, Hints, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
+    VelocityDrag, VelocityPoint,
 };
 use discrete_herglotz::boundary::{BoundaryPath, End};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod};
@@ -35,6 +36,26 @@ impl Lagrangian<1> for Unstated {
     }
     fn switching_functions(&self, _t: f64, x: &VelocityPoint<1>, values: &mut Vec<f64>) {
         values.push(x.q[0]);
+    }
+}
+
+/// A ridge on a circle.
+#[derive(Clone, Copy, Debug)]
+pub struct Ridge;
+
+impl Lagrangian<2> for Ridge {
+    const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
+    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
+        v.dot(v) * 0.5 - q[0].abs()
+    }
+    fn switching_functions(&self, _t: f64, x: &VelocityPoint<2>, values: &mut Vec<f64>) {
+        values.push(x.q[0]);
+    }
+}
+
+impl Constraint<2, 1> for Ridge {
+    fn value<T: Scalar>(&self, q: &SVector<T, 2>) -> SVector<T, 1> {
+        [q.dot(q) - 1.0].into()
     }
 }
 
@@ -207,6 +228,11 @@ fn input_errors() {
             let lobatto = Constrained::new(&hanging, ConstrainedMethod::Lobatto { stages: 3 });
             problem.by(lobatto).steps(Steps::Count(3)).run(Until::Time(1.0)).err().unwrap()
         }, ["off the constraints", "constraint 0", "OffConstraint::Project"];
+        InputError::KinksUnderConstraints => {
+            let problem = Problem::new(&Ridge, 0.0, VelocityPoint::new([1.0, 0.0], [0.0, 0.0], 0.0)).unwrap();
+            let lobatto = Constrained::new(&Ridge, ConstrainedMethod::Lobatto { stages: 3 });
+            problem.by(lobatto).steps(Steps::Count(3)).run(Until::Time(1.0)).err().unwrap()
+        }, ["kinks or jumps", "under constraints", "smooth it"];
         InputError::Sigma { .. } => Flow::new(&strong(), 0.0, pendulum_at(0.5)).err().unwrap(), ["sigma_d = -1", "smaller step"];
         InputError::EqualPoints => {
             Flow::from_points(&Length, 0.0, DiscretePoint::new([0.3], [0.3], 0.0)).err().unwrap()
