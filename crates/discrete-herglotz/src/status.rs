@@ -27,7 +27,7 @@ impl std::fmt::Display for UnresolvedStep {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Status {
-    /// All steps were taken.
+    /// All steps were taken, or those until the motion came to rest, where it remains.
     Completed,
     /// An observer ended the run.
     Stopped {

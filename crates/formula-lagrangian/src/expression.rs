@@ -132,6 +132,11 @@ impl Expression {
         self.inputs.meets(Inputs::VELOCITY)
     }
 
+    /// Whether the expression depends on time.
+    pub fn has_time(&self) -> bool {
+        self.inputs.meets(Inputs::TIME)
+    }
+
     /// Whether the expression depends on the action.
     pub fn has_action(&self) -> bool {
         self.inputs.meets(Inputs::ACTION)

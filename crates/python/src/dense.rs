@@ -65,6 +65,8 @@ pub struct Dense {
     resets: Vec<Start>,
     /// The end of the motion, which may lie within a step that could not be completed.
     until: f64,
+    /// The time of the node after which the motion is at rest, if it comes to rest.
+    rests_from: Option<f64>,
 }
 
 /// The times, positions, velocities, momenta, actions and energies of states.
@@ -93,20 +95,20 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
             nodes: true,
             ..motion.motion.clone()
         };
-        motion.system.run(&again, &mut store)?;
-        Ok(Some(by))
+        let outcome = motion.system.run(&again, &mut store)?;
+        Ok(Some((by, outcome.rests_from)))
     });
     if let Some(raised) = motion.signals.take() {
         return Err(raised);
     }
     let by = by.map_err(|error: herglotz_runtime::RuntimeError| value_error(error))?;
-    let by = by.ok_or_else(|| {
+    let (by, rests_from) = by.ok_or_else(|| {
         value_error(
             "the integrator of the plan does not support dense output: name another \
                                            `integrator`",
         )
     })?;
-    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, resets: store.resets, until })
+    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, resets: store.resets, until, rests_from })
 }
 
 impl Dense {
@@ -133,6 +135,11 @@ impl Dense {
             velocity: InitialVelocity::MomentumNear { p: part(p), v: part(v) },
             z: at(z, k),
         };
+        if self.rests_from == Some(start.t) {
+            // The state there is that of the node: motions that end at their start.
+            let there = |time: f64| self.rows(Start { t: time, ..start.clone() }, time, vec![time], all);
+            return Ok(times.into_iter().map(there).collect::<PyResult<Vec<_>>>()?.concat());
+        }
         self.rows(start, t.get(k + 1).copied().unwrap_or(self.until), times, all)
     }
 

@@ -149,6 +149,7 @@ fn outcome_of_start(motion: &Motion) -> Outcome {
         status: Status::Stopped { step: 0, t: start.t, by: INTERRUPTION },
         unresolved: None,
         steps: 0,
+        rests_from: None,
         t: start.t,
         q: start.q.clone(),
         p: p.unwrap_or_else(|| vec![f64::NAN; start.q.len()]),

@@ -11,6 +11,8 @@ pub struct Outcome {
     pub unresolved: Option<UnresolvedStep>,
     /// The steps taken.
     pub steps: usize,
+    /// The time at which the motion came to rest, if it did: no step was taken after it.
+    pub rests_from: Option<f64>,
     /// The time reached.
     pub t: f64,
     /// The position there.
@@ -75,7 +77,7 @@ pub struct Plan {
     pub integrator: MethodInfo,
     /// The step, negative where the motion runs backward.
     pub step_size: f64,
-    /// The number of steps.
+    /// The number of steps; none is taken after the motion has come to rest.
     pub steps: usize,
     /// The error that the trial runs measured or predict, where an accuracy was requested.
     pub error: Option<f64>,

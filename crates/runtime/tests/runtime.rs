@@ -3,6 +3,7 @@
 #![allow(missing_docs)]
 
 mod accuracy;
+mod advice;
 mod body;
 mod divided_steps;
 mod fit;
@@ -11,6 +12,7 @@ mod lyapunov_of_impacts;
 mod motions;
 mod pairs;
 mod path;
+mod rest;
 mod rows_beside_kinks;
 mod sensitive;
 mod sensitivity;

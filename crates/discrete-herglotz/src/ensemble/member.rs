@@ -40,7 +40,7 @@ impl From<Outcome> for Ending {
 pub struct Tally {
     /// The members with which the fold was called.
     pub members: usize,
-    /// The members that took all of their steps.
+    /// The members that reached the end.
     pub completed: usize,
     /// The members that an observer ended.
     pub stopped: usize,

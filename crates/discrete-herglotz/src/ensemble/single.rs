@@ -129,7 +129,8 @@ impl Common {
         self.rows.map_or(0, |stride| steps / stride.max(1) + 2)
     }
 
-    /// The plan with the most steps among those of some members, and the member; the first error if none has a plan.
+    /// The plan with the most steps among those of some members, with the member, and whether one of them is expected to
+    /// come to rest; the first error if none has a plan.
     ///
     /// # Errors
     /// [`EnsembleError::Member`] with a false claim of structure, or an interruption.
@@ -138,10 +139,14 @@ impl Common {
         members: &dyn Members,
         sample: impl Iterator<Item = usize>,
         settings: (MemberSteps, Option<Interrupt<'_>>),
-    ) -> Result<Result<(usize, (f64, usize)), EnsembleError>, EnsembleError> {
-        let mut planned = Err(EnsembleError::Empty);
+    ) -> Result<(Result<(usize, (f64, usize)), EnsembleError>, bool), EnsembleError> {
+        let (mut planned, mut rests) = (Err(EnsembleError::Empty), false);
         for index in sample {
-            match (self.plan(members, index, settings), &planned) {
+            let plan = self.plan(members, index, settings).map(|(plan, at_rest)| {
+                rests |= at_rest;
+                plan
+            });
+            match (plan, &planned) {
                 (Ok(plan), Ok((_, (_, most)))) if plan.1 <= *most => {}
                 (Ok(plan), _) => planned = Ok((index, plan)),
                 (Err(cause @ (InputError::FalseClaim { .. } | InputError::Interrupted)), _) => {
@@ -151,20 +156,23 @@ impl Common {
                 (Err(_), _) => {}
             }
         }
-        Ok(planned)
+        Ok((planned, rests))
     }
 
-    /// The step size and the number of steps of the run of a member with these steps, after all checks of a plan.
+    /// The step size and the number of steps of the run of a member with these steps, and whether it is expected to come
+    /// to rest, after all checks of a plan.
     pub fn plan(
         &self,
         members: &dyn Members,
         index: usize,
         settings: (MemberSteps, Option<Interrupt<'_>>),
-    ) -> Result<(f64, usize), InputError> {
+    ) -> Result<((f64, usize), bool), InputError> {
         let mut planned = Err(InputError::NoSteps);
         members.with_run(index, settings, &mut |run| {
             let run = if self.action { run } else { run.without_action() };
-            planned = run.plan(self.until).map(|plan: Plan<'_>| (plan.step_size(), plan.count()));
+            planned = run
+                .plan(self.until)
+                .map(|plan: Plan<'_>| ((plan.step_size(), plan.count()), plan.rests_after.is_some()));
         })?;
         planned
     }

@@ -34,7 +34,8 @@ pub(crate) struct Task<'e> {
     pub common: Common,
     /// The step size and the number of steps.
     pub plan: (f64, usize),
-    /// Whether there are steps for lanes: not where equal steps suit none of the checked members.
+    /// Whether there are steps for lanes: not where equal steps suit none of the checked members, or one of them comes to
+    /// rest, since lanes would take steps after that, and have no accuracy there.
     pub takes_lanes: bool,
     pub interrupt: Option<Interrupt<'e>>,
     /// The kernels of all members, if they have one Lagrangian.
@@ -72,12 +73,13 @@ impl<'e> Task<'e> {
         }
         let longest_plan = |steps| common.longest_plan(members, settings.sample(), (steps, interrupt));
         let mut takes_lanes = members.batch_kernel().is_some() && !observed;
-        let mut planned = longest_plan(if takes_lanes { MemberSteps::Common } else { MemberSteps::Own })?;
+        let (mut planned, rests) = longest_plan(if takes_lanes { MemberSteps::Common } else { MemberSteps::Own })?;
         if planned.is_err() && takes_lanes && members.selects_integrator() {
             // Equal steps suit none of these members; runs of their own may have others.
             takes_lanes = false;
-            planned = longest_plan(MemberSteps::Own)?;
+            planned = longest_plan(MemberSteps::Own)?.0;
         }
+        takes_lanes &= !rests;
         if observed && let Err(EnsembleError::Member { index, cause: InputError::Accuracy { .. } }) = planned {
             // The observer of a member may end its motion before it becomes too difficult.
             planned = Ok((index, (0.0, 0)));
@@ -87,7 +89,7 @@ impl<'e> Task<'e> {
         let to_accuracy = members.requested_error().is_some();
         if to_accuracy && takes_lanes {
             let steps = Steps::Count(plan.1 + plan.1.div_ceil(STEPS_PER_EXTRA_STEP));
-            plan = common.plan(members, index, (MemberSteps::Given(steps), interrupt)).map_err(refused)?;
+            plan = common.plan(members, index, (MemberSteps::Given(steps), interrupt)).map_err(refused)?.0;
         }
         rows::check(common.rows_of(plan.1).saturating_mul(count.min(MEMBERS_PER_SHARD))).map_err(refused)?;
         let check_resolution = settings.check_resolution && !to_accuracy;

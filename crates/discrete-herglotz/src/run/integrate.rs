@@ -1,7 +1,7 @@
 //! The main loop of a run.
 
 use crate::integration::motion::Motion;
-use crate::run::checks::rest::{REST, is_at_rest};
+use crate::run::checks::rest::is_at_rest;
 use crate::run::checks::{Checks, TakenSteps, single_step_stop};
 use crate::run::end_within_step::end_within_step;
 use crate::run::findings::Findings;
@@ -40,10 +40,10 @@ pub(crate) fn integrate(
             break;
         }
         let before = step.into_single();
-        let at_rest = run.is_at_rest(is_full_check);
-        run.over |= at_rest;
-        run.observe(first, before, at_rest);
+        run.look_for_rest(is_full_check || run.taken >= run.next_observed(first));
+        run.observe(first, before);
     }
+    run.rest();
     Ok(run.outcome())
 }
 
@@ -58,19 +58,21 @@ impl Plan<'_> {
 }
 
 /// The state of a run in progress.
-struct Integration<'r, 'p, 'o> {
-    plan: &'r Plan<'p>,
-    observers: &'r mut Observers<'o>,
-    info: RunInfo,
-    stepper: Box<dyn Stepper + 'p>,
-    checks: Checks<'r, 'p>,
-    taken: usize,
+pub(super) struct Integration<'r, 'p, 'o> {
+    pub plan: &'r Plan<'p>,
+    pub observers: &'r mut Observers<'o>,
+    pub info: RunInfo,
+    pub stepper: Box<dyn Stepper + 'p>,
+    pub checks: Checks<'r, 'p>,
+    pub taken: usize,
     /// Whether the last step has been taken.
     over: bool,
+    /// If the motion has come to rest, the time until which observers have seen it.
+    pub rested_until: Option<f64>,
     /// The status, if the run ended before its last step.
-    status: Option<Status>,
-    /// The time and the state at the end, if the run ended within a step.
-    end: Option<(f64, State)>,
+    pub status: Option<Status>,
+    /// The time and the state at the end, if the run ended within a step or at rest.
+    pub end: Option<(f64, State)>,
 }
 
 impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
@@ -85,33 +87,42 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
             return Err(InputError::Unsaved);
         }
         let in_transformed_time = steps.info.in_transformed_time;
-        // If the trial runs found an event that ends the run, the number of steps up to it.
-        let expected = plan.ends_after.map_or(steps.count, |ended| steps.count.min(ended.saturating_add(1)));
+        // If the trial runs found an event that ends the run, or a time of rest, the number of steps up to it.
+        let expected = plan.ends_after.into_iter().chain(plan.rests_after).min();
+        let expected = expected.map_or(steps.count, |ended| steps.count.min(ended.saturating_add(1)));
         let info = RunInfo {
             dimension: steps.problem.system.dimension(),
             t0: steps.problem.t0,
-            t_end: plan.rests_until.unwrap_or(steps.t_end),
+            t_end: steps.t_end,
             h: (!in_transformed_time).then_some(steps.h),
             count: (!in_transformed_time || steps.error.is_some()).then_some(expected),
         };
         observers.prepare(&info)?;
         let (mut checks, mut taken) = (Checks::of(steps, plan.constant_rate, plan.ends_after), 0);
+        let mut rested_until = None;
         if let Some(from) = from {
             if from.fingerprint != steps.fingerprint() || !stepper.restore(&from.words) {
                 return Err(InputError::AnotherRun);
             }
             let ResumeState { log_factor, unresolved, energy, .. } = *from;
-            taken = from.taken;
+            (taken, rested_until) = (from.taken, from.rested_until);
             checks.resume(Findings { log_factor, unresolved, energy });
         }
         // A run may be resumed at its end.
         let over = steps.is_over(taken, stepper.time());
-        Ok(Integration { plan, observers, info, stepper, checks, taken, over, status: None, end: None })
+        let (status, end) = (None, None);
+        let mut run = Integration { plan, observers, info, stepper, checks, taken, over, rested_until, status, end };
+        if from.is_some() || plan.rests_after == Some(0) {
+            run.look_for_rest(true);
+        }
+        Ok(run)
     }
 
     /// Calls the observers at the start.
     fn start(&mut self) {
-        let start = self.plan.view(&*self.stepper, None, self.checks.findings, (self.taken, self.over));
+        let last = self.over && self.rested_until.is_none();
+        let mut start = self.plan.view(&*self.stepper, None, self.checks.findings, (self.taken, last));
+        start.t = self.rested_until.unwrap_or(start.t);
         let stop = self.observers.start(&start).break_value();
         self.stop(stop);
     }
@@ -119,7 +130,8 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
     /// The number of steps after which an observer or a check is due next.
     fn next(&self) -> usize {
         let observed = single_step_stop(self.taken, self.next_observed(self.taken));
-        observed.min(self.checks.next(self.taken)).min(self.plan.steps.most())
+        let rests = self.plan.rests_after.filter(|steps| *steps > self.taken).unwrap_or(usize::MAX);
+        observed.min(self.checks.next(self.taken)).min(rests).min(self.plan.steps.most())
     }
 
     fn next_observed(&self, taken: usize) -> usize {
@@ -154,20 +166,22 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
         }
     }
 
-    /// Whether the motion is at rest: at the end of the plan if the plan found a time of rest, otherwise at the steps
-    /// at which all claims are checked.
-    fn is_at_rest(&self, is_full_check: bool) -> bool {
-        if self.over {
-            return self.plan.rests_until.is_some();
+    /// Ends the steps if the motion is at rest: after the steps of the trial runs if these ended at rest, and at steps that
+    /// are checked or observed, since functions of smaller numbers than those of rest are round-off.
+    fn look_for_rest(&mut self, is_due: bool) {
+        let (steps, t) = (&self.plan.steps, self.stepper.time());
+        let rests = |state: &State| is_at_rest(&steps.problem, steps.needs, (t, steps.t_end), state);
+        let is_expected = self.plan.rests_after == Some(self.taken);
+        if !self.over && (is_expected || is_due && rests(&self.stepper.state())) {
+            self.rested_until = self.rested_until.or(Some(t));
         }
-        let steps = &self.plan.steps;
-        is_full_check && is_at_rest(&steps.problem, steps.needs, self.stepper.time(), &self.stepper.state())
+        self.over |= self.rested_until.is_some();
     }
 
     /// Calls the observers at the end of the last step, if they are due.
-    fn observe(&mut self, first: usize, before: Option<(f64, State)>, at_rest: bool) {
+    fn observe(&mut self, first: usize, before: Option<(f64, State)>) {
         if self.taken >= self.next_observed(first) || self.over {
-            let (findings, last) = (self.checks.findings, self.over && !at_rest);
+            let (findings, last) = (self.checks.findings, self.over && self.rested_until.is_none());
             let end = self.plan.view(&*self.stepper, before, findings, (self.taken, last));
             let stop = self.observers.step(&end).break_value();
             if let Some(Stop { at: Some((t, _)), .. }) = stop
@@ -177,13 +191,10 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
             }
             self.stop(stop);
         }
-        if at_rest && self.status.is_none() {
-            self.stop(Some(Stop::here(REST)));
-        }
     }
 
     /// Ends the run if an observer stopped it.
-    fn stop(&mut self, stop: Option<Stop>) {
+    pub fn stop(&mut self, stop: Option<Stop>) {
         let Some(Stop { by, cause, at }) = stop else { return };
         let step = self.taken;
         let t = at.as_ref().map_or(self.stepper.time(), |(t, _)| *t);
@@ -195,7 +206,7 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
     }
 
     fn outcome(self) -> Outcome {
-        let Integration { plan, stepper, checks, taken, status, end, .. } = self;
+        let Integration { plan, stepper, checks, taken, rested_until, status, end, .. } = self;
         let steps = &plan.steps;
         let (t, state, velocity) = (stepper.time(), stepper.state(), stepper.last_velocity());
         let near = velocity.as_ref();
@@ -208,6 +219,7 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
             status: status.unwrap_or(Status::Completed),
             unresolved: crate::status::first(unresolved, checks.unresolved_by(&*stepper)),
             steps: taken,
+            rests_from: rested_until.map(|_| stepper.time()),
             t,
             v: steps.velocity(t, &state, near).ok(),
             q: state.q,

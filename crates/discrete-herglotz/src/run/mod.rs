@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod any_integrator;
+pub(crate) mod at_rest;
 mod builder;
 mod checks;
 pub(crate) mod discretization;

@@ -13,6 +13,9 @@ pub struct Outcome {
     pub unresolved: Option<UnresolvedStep>,
     /// The number of steps taken.
     pub steps: usize,
+    /// The time at which the motion came to rest, if it did before the run ended: no step was taken after it, and the
+    /// state remained the same.
+    pub rests_from: Option<f64>,
     /// The final time.
     pub t: f64,
     /// The final position.

@@ -33,8 +33,8 @@ pub struct Plan<'p> {
     pub(crate) constant_rate: bool,
     /// Whether an error estimate was requested.
     pub(crate) estimated: bool,
-    /// The requested end time, if the run ends earlier because the motion comes to rest.
-    pub(crate) rests_until: Option<f64>,
+    /// The number of steps after which the motion is expected to be at rest; no step is taken after that.
+    pub(crate) rests_after: Option<usize>,
     /// A stepper at the start, for the first run of the plan.
     start: Cell<Option<Box<dyn Stepper + 'p>>>,
 }
@@ -49,7 +49,7 @@ impl<'p> Plan<'p> {
             work_summary: stepper.work_summary(),
             constant_rate: stepper.run_support().is_some_and(|run| run.has_constant_rate()),
             estimated: false,
-            rests_until: None,
+            rests_after: None,
             start: Cell::new(Some(stepper)),
             steps,
         })
@@ -62,7 +62,7 @@ impl<'p> Plan<'p> {
     }
 
     /// The number of steps. For steps of a given size in transformed time it is an estimate from `dt/dtau` at the
-    /// start. An observer may end the run earlier.
+    /// start. An observer may end the run earlier, and no step is taken after the motion has come to rest.
     pub fn count(&self) -> usize {
         self.steps.count
     }
@@ -102,7 +102,20 @@ impl<'p> Plan<'p> {
     ) -> StepView<'r> {
         let log_factor = self.steps.needs.conformal_factor.then_some(findings.log_factor);
         let (t, state, sigma, motion) = (stepper.time(), stepper.state(), stepper.sigma(), &self.steps);
-        StepView { k, t, state, sigma, log_factor, last, findings, before, motion, stepper, in_failed_step: false }
+        StepView {
+            k,
+            t,
+            state,
+            sigma,
+            log_factor,
+            last,
+            findings,
+            before,
+            motion,
+            stepper,
+            in_failed_step: false,
+            at_rest: None,
+        }
     }
 
     /// Checks the claims of structure along the first steps.

@@ -3,10 +3,13 @@
 use crate::InputError;
 use crate::integration::check_claims::check_claims_over;
 use crate::run::Plan;
+use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::DEFAULT_STAGES;
+use crate::run::checks::rest::remains_at_rest;
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
-use crate::run::request::{MAX_STEPS, Request, StepControl, StepSelection, Steps};
+use crate::run::request::{MAX_STEPS, Request, SelectSteps, StepControl, StepSelection, Steps};
+use crate::switching::Collocation;
 use contact_geom::numbers::max_or_nan;
 
 /// The number of times in the span at which the claims of structure are checked before a run with given steps.
@@ -25,15 +28,6 @@ impl<'p> Request<'p> {
         if span == 0.0 {
             return self.plan_of_the_start(length);
         }
-        // After the motion has come to rest, errors relative to it are undefined.
-        if let StepControl::Accuracy(_, _, collocation) = &length
-            && let Some(t_end) = self.time_of_rest(collocation.clone())
-        {
-            let request = Request { t_end, span: t_end - problem.t0, ..self.clone() };
-            let mut plan = request.plan(length, terminal)?;
-            plan.rests_until = Some(self.t_end);
-            return Ok(plan);
-        }
         if let Some(integrator) = &self.integrator {
             integrator.check()?;
             let info = integrator.info();
@@ -48,20 +42,46 @@ impl<'p> Request<'p> {
         let accuracy = matches!(length, StepControl::Accuracy(..));
         let times = if accuracy { CHECKED_TIMES_BEFORE_TRIAL_RUNS } else { CHECKED_TIMES };
         check_claims_over(&*problem.system, problem.t0, span, &problem.start, times)?;
-        let selection = match length {
+        let (selection, rests_after) = match length {
             StepControl::Accuracy(wanted, select_steps, collocation) => {
-                select_steps(self, wanted, collocation, terminal)?
+                self.within(wanted, select_steps, collocation, terminal)?
             }
-            StepControl::Given(steps) => self.given(steps)?,
-            StepControl::Exactly(count, h) => StepSelection { h, ..self.given(Steps::Count(count))? },
+            StepControl::Given(steps) => (self.given(steps)?, None),
+            StepControl::Exactly(count, h) => (StepSelection { h, ..self.given(Steps::Count(count))? }, None),
         };
         check_count(selection.count as f64)?;
-        let plan = Plan::new(self, &selection)?;
+        let mut plan = Plan::new(self, &selection)?;
+        plan.rests_after = rests_after;
         // If an accuracy was requested, the trial runs have made these checks.
         if plan.error().is_none() {
             plan.check_first_steps()?;
         }
         Ok(plan)
+    }
+
+    /// The steps that trial runs select. After the motion has come to rest, errors relative to it are undefined: the trial
+    /// runs end there, and the steps have their length, over the whole span. With the number of steps after which the
+    /// motion is expected to be at rest.
+    fn within(
+        &self,
+        wanted: f64,
+        select_steps: SelectSteps<'p>,
+        collocation: Collocation<'p>,
+        terminal: Option<Terminal<'_>>,
+    ) -> Result<(StepSelection<'p>, Option<usize>), InputError> {
+        if wanted > 0.0 && remains_at_rest(&self.problem, self.needs, self.t_end) {
+            let count = first_guess(self, DEFAULT_STAGES, wanted);
+            let h = self.span / count as f64;
+            let integrator = self.integrator.clone().unwrap_or_else(|| collocation.gauss(DEFAULT_STAGES));
+            return Ok((StepSelection { integrator, count, h, error: Some(0.0), ended: None }, Some(0)));
+        }
+        let Some(t_end) = self.time_of_rest(collocation.clone()) else {
+            return Ok((select_steps(self, wanted, collocation, terminal)?, None));
+        };
+        let span = t_end - self.problem.t0;
+        let moving = select_steps(&Request { t_end, span, ..self.clone() }, wanted, collocation, terminal)?;
+        let (ended, rests_after) = (moving.ended, Some(moving.count));
+        Ok((StepSelection { ended, ..moving.extended_by(self.span / span) }, rests_after))
     }
 
     /// The plan of a run that ends at its start time: no step is taken.

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 /// The first word of a checkpoint file, and the version of its format.
 const MAGIC: u64 = u64::from_le_bytes(*b"herglotz");
-const VERSION: u64 = 3;
+const VERSION: u64 = 4;
 
 /// The reason why a file cannot be used as a checkpoint.
 #[derive(Debug, Error)]
@@ -44,6 +44,8 @@ pub struct ResumeState {
     pub(crate) log_factor: f64,
     pub(crate) unresolved: Option<UnresolvedStep>,
     pub(crate) energy: EnergySums,
+    /// If the motion had come to rest, the time until which it was followed.
+    pub(crate) rested_until: Option<f64>,
     /// The saved words of the stepper.
     pub(crate) words: Vec<u64>,
 }
@@ -82,7 +84,8 @@ impl ResumeState {
         let unresolved = load_option(&mut from, || UnresolvedStep { step: 0, defect: 0.0 })?;
         let mut energy = EnergySums::default();
         Saved::load(&mut energy, &mut from)?;
-        Some(ResumeState { fingerprint, taken, log_factor, unresolved, energy, words: from.to_vec() })
+        let rested_until = load_option(&mut from, || 0.0)?;
+        Some(ResumeState { fingerprint, taken, log_factor, unresolved, energy, rested_until, words: from.to_vec() })
     }
 
     /// Encodes the state as bytes, with a digest, for [`from_bytes`](Self::from_bytes): the contents of a checkpoint
@@ -93,6 +96,7 @@ impl ResumeState {
         self.log_factor.save(&mut body);
         save_option(self.unresolved.as_ref(), &mut body);
         self.energy.save(&mut body);
+        save_option(self.rested_until.as_ref(), &mut body);
         body.extend_from_slice(&self.words);
         let sum = digest(&body);
         let words = [MAGIC, VERSION].into_iter().chain(body).chain([sum]);

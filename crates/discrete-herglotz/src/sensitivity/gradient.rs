@@ -15,7 +15,7 @@ use crate::sensitivity::time_jumps::TimeJumps;
 use crate::sensitivity::velocity_dependence::VelocityDependence;
 use crate::sensitivity::{EndCovector, Loss, MotionState, SensitivityError};
 use crate::system::products::times;
-use crate::{InputError, Point, Problem, SecondDerivatives, Status, StepError, Stepper, Vector};
+use crate::{InputError, Point, Problem, SecondDerivatives, State, Status, StepError, Stepper, Vector};
 use contact_geom::{GeometryError, Parametric};
 use std::ops::Range;
 
@@ -250,7 +250,7 @@ impl RecordedRun<'_> {
         }
         let failed = |step: usize, cause: StepError| SensitivityError::Step { step, cause };
         let end = self.end().ok_or_else(|| failed(self.outcome.steps, StepError::NonFinite))?;
-        let x = Point { q: end.q, v: end.v, z: end.z };
+        let x = Point { q: end.q.clone(), v: end.v.clone(), z: end.z };
         let of_velocity =
             VelocityDependence::at(problem, end.t, &x, &end.p).map_err(|e| failed(self.outcome.steps, e))?;
         // The derivatives in the end time for a fixed state (q, p, z).
@@ -264,6 +264,9 @@ impl RecordedRun<'_> {
         let mut engine = StepTangent::new(problem, steps, Direction::Backward)?;
         let (jumps, same) = (TimeJumps::new(problem, steps), SameTime::of_span((steps.problem.t0, steps.t_end)));
         let mut rows = RowCovectors { problem, steps, jumps: &jumps, same, times, of_rows, tangent: RowTangent::new() };
+        if let (Some(from), Some(first)) = (self.outcome.rests_from, all.first_mut()) {
+            rows.add_at_rest(from, &end, first).map_err(|cause| failed(self.outcome.steps, cause))?;
+        }
         let mut stepper = self.plan.stepper()?;
         let mut of_parts = PartCovectors { problem, steps, jumps: &jumps, tangent: RowTangent::new() };
         let mut block: Vec<TakenStep> = Vec::with_capacity(BLOCK);
@@ -327,6 +330,22 @@ pub(super) struct RowCovectors<'r, 'p> {
 }
 
 impl<'p> RowCovectors<'_, 'p> {
+    /// Adds the covectors of the rows after the time at which the motion has come to rest to that of its end, whose state is
+    /// theirs: since the tangent has come to rest with it, the covector of the end is also that of this time.
+    fn add_at_rest(&mut self, from: f64, end: &MotionState, to: &mut Covector) -> Result<(), StepError> {
+        let MotionState { q, v, p, z, .. } = end;
+        while let Some(t) = self.times.last().copied() {
+            let is_later = if self.steps.h < 0.0 { t < from } else { t > from };
+            if self.same.is(t, from) || !is_later {
+                break;
+            }
+            let state = State { q: q.clone(), p: p.clone(), z: *z };
+            let Some(row) = self.take(&PartPoint { t, state, v: v.clone() })? else { break };
+            to.add_multiple(1.0, &row);
+        }
+        Ok(())
+    }
+
     /// Adds the covectors of the rows after the start of a step, the k-th of the run, to that at its start; `engine` is the
     /// tangent of whole steps.
     fn add(

@@ -25,7 +25,8 @@ use std::ops::ControlFlow;
 /// and those that meet another reset do not have them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LyapunovExponents {
-    /// The outcome of the run. Where it ended early, the exponents are those of its whole steps.
+    /// The outcome of the run. Where it ended early, the exponents are those of its whole steps; a run ends where its motion
+    /// comes to rest.
     pub outcome: Outcome,
     /// The `2n + 1` exponents, in descending order; NaN if no step was taken.
     pub exponents: Vec<f64>,
@@ -110,6 +111,10 @@ impl Observer for Frame<'_, '_> {
     }
 
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        if at.is_at_rest() {
+            // The exponents are those of the steps.
+            return ControlFlow::Break(Stop { at: Some(self.before.clone()), ..Stop::here("rest") });
+        }
         // A part of a step, where a run ends within it, is not carried over.
         if at.in_failed_step || at.k <= self.taken {
             return ControlFlow::Continue(());

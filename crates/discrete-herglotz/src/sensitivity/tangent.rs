@@ -96,6 +96,19 @@ impl Columns<'_, '_> {
         self.row_at_end(at)
     }
 
+    /// The rows in an interval in which the motion is at rest: the state does not change there, and since the tangent has
+    /// come to rest with it, neither do its columns.
+    fn rows_at_rest(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
+        let failed = |cause| SensitivityError::Step { step: at.k, cause };
+        while let Some(t) = self.carried.times.next_within((self.before.0, at.t)) {
+            let state = MotionState::at(t, &at.state, &at.velocity().map_err(failed)?);
+            let row = row(self.carried.problem, state, &self.carried.columns, |_| 0.0);
+            self.carried.rows.push(row.map_err(failed)?);
+        }
+        self.before.0 = at.t;
+        self.row_at_end(at)
+    }
+
     /// The row at the end of the last step, if its time is requested.
     fn row_at_end(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         if self.carried.times.next_at(at.t, at.last).is_none() {
@@ -138,6 +151,10 @@ impl Observer for Columns<'_, '_> {
     }
 
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        if at.is_at_rest() {
+            let rows = self.rows_at_rest(at);
+            return self.end_on_failure(rows);
+        }
         // A part of a step, where a run ends within it, is not carried over.
         if at.in_failed_step || at.k <= self.taken {
             return ControlFlow::Continue(());

@@ -68,6 +68,10 @@ impl Observer for MemberObserver<'_> {
         self.rows.as_ref().map_or(usize::MAX, |rows| rows.next(taken))
     }
 
+    fn follows_rest(&mut self, _from: &StepView<'_>, _t_end: f64) -> bool {
+        self.crossings.as_ref().is_some_and(Crossings::follows_rest)
+    }
+
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         for rows in self.rows.iter_mut().chain(&mut self.last) {
             rows.start(at)?;

@@ -77,13 +77,14 @@ impl<'r> Recorder<'r> {
     }
 
     fn notify(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
-        if self.nodes {
+        if self.nodes && (at.last || !at.is_at_rest()) {
             let State { q, p, z } = &at.state;
             // The velocity is set to zero where none corresponds to the momentum; q and p are valid.
             let v = at.velocity().unwrap_or_else(|_| Vector::zeros(q.len()));
             self.monitor.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
-        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
+        let is_due = at.is_at_rest() || at.k.is_multiple_of(STEPS_BETWEEN_POLLS);
+        if is_due
             && let Some(RunInfo { t0, t_end, .. }) = self.run_info
             && self.monitor.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()
         {
@@ -92,7 +93,7 @@ impl<'r> Recorder<'r> {
             }
             return ControlFlow::Break(Stop::here("the monitor"));
         }
-        if at.k.is_multiple_of(STEPS_BETWEEN_POLLS)
+        if is_due
             && self.monitor.wants_checkpoint()
             && let Some(saved) = at.resume_state()
             && self.monitor.checkpoint(at.k, saved).is_break()
@@ -276,6 +277,12 @@ impl<'r> Crossings<'r> {
         self.events.start(at)
     }
 
+    /// Whether an event may occur after the motion has come to rest: one whose function depends on time.
+    pub fn follows_rest(&self) -> bool {
+        let functions = self.searched.iter().filter_map(|i| self.requested.get(*i)).map(|event| &event.function);
+        functions.into_iter().any(|function| function.has_time() || function.has_conformal_factor())
+    }
+
     /// The terminal events, at which trial runs end.
     pub fn terminal(&self) -> Option<Terminal<'_>> {
         self.events.terminal()
@@ -379,6 +386,10 @@ impl Observer for Recorder<'_> {
         }
         let poll = (taken / STEPS_BETWEEN_POLLS + 1) * STEPS_BETWEEN_POLLS;
         self.rows.as_ref().map_or(poll, |rows| rows.next(taken).min(poll))
+    }
+
+    fn follows_rest(&mut self, _from: &StepView<'_>, _t_end: f64) -> bool {
+        self.crossings.as_ref().is_some_and(Crossings::follows_rest)
     }
 
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {

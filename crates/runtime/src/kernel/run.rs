@@ -146,6 +146,7 @@ pub(super) fn outcome_of<P>(
         status: outcome.status,
         unresolved: outcome.unresolved,
         steps: outcome.steps,
+        rests_from: outcome.rests_from,
         t: outcome.t,
         q: coordinates(&outcome.q, n).to_vec(),
         p: coordinates(&outcome.p, n).to_vec(),

@@ -339,6 +339,7 @@ impl SparseRun<'_, '_> {
             z: Some(*z),
             log_factor: self.motion.conformal_factor.then_some(self.log_factor),
             error_estimate: None,
+            rests_from: None,
             evaluations: self.stepper.evaluations(self.taken),
         }
     }

@@ -10,7 +10,7 @@ pub(crate) mod equilibrium_round_off;
 mod estimate;
 mod evaluation_cost;
 mod failure;
-mod first_guess;
+pub(crate) mod first_guess;
 mod last_digit;
 pub(crate) mod limits;
 mod matrices;

@@ -18,13 +18,16 @@ impl<'p> Request<'p> {
             return None;
         }
         let problem = &self.problem;
-        let change = problem.system.gradient(problem.t0, &problem.start).z * self.span;
+        let rate = problem.system.gradient(problem.t0, &problem.start).z;
         // Written so that a NaN counts as no decrease.
-        let decays = change < -MIN_DECAY_TO_REST;
-        if !decays || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z) {
+        let decays = rate * self.span < -MIN_DECAY_TO_REST;
+        if !decays || starts_at_rest(problem) || !rests_at_the_origin(problem, problem.start.z, self.span) {
             return None;
         }
-        let h = self.span / first_guess(self, DEFAULT_STAGES, REST_SEARCH_ERROR) as f64;
+        // The steps for this decay are those of any longer span.
+        let span = -MIN_DECAY_TO_REST / rate;
+        let decay = Request { t_end: problem.t0 + span, span, ..self.clone() };
+        let h = span / first_guess(&decay, DEFAULT_STAGES, REST_SEARCH_ERROR) as f64;
         let options = StepperOptions { action: self.needs.action, ..StepperOptions::default() };
         let mut stepper = collocation.stepper(problem, DEFAULT_STAGES, h, options).ok()?;
         for _ in 0..MAX_REST_SEARCH_STEPS / STEPS_BETWEEN_REST_CHECKS {
@@ -33,7 +36,7 @@ impl<'p> Request<'p> {
             if (t - problem.t0).abs() >= self.span.abs() {
                 return None;
             }
-            if is_at_rest(problem, self.needs, t, &stepper.state()) {
+            if is_at_rest(problem, self.needs, (t, self.t_end), &stepper.state()) {
                 return Some(t);
             }
         }

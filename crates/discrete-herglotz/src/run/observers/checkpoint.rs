@@ -39,7 +39,7 @@ impl Observer for Checkpoint {
     }
 
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
-        if !at.k.is_multiple_of(self.every) && !at.last {
+        if !at.ends_multiple_of(self.every) && !at.last {
             return ControlFlow::Continue(());
         }
         // The stepper can be saved; otherwise the run is refused at its start.

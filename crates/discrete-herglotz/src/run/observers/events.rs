@@ -8,6 +8,10 @@ use crate::solve::sign_changes::Separator;
 use crate::{InputError, State, StepError};
 use std::ops::ControlFlow;
 
+/// The number of times at which a function is evaluated at the state of a motion at rest: if all values are the same, it
+/// depends on the state alone, and has no sign change after that.
+const TIMES_AT_REST: usize = 1024;
+
 /// Locates events along a run, each to the round-off of the time, for any integrator.
 ///
 /// All sign changes within a step are found. The functions are evaluated on an interpolant of the motion, at the
@@ -21,6 +25,9 @@ use std::ops::ControlFlow;
 /// the sign changes within a step cannot be told apart, the run ends with [`StepError::EventUnresolved`]. What no
 /// evaluation shows is missed: a pulse that is much narrower than the distance of the nodes. A zero without a sign
 /// change is missed too. A function value that is not finite ends the run.
+///
+/// After the motion has come to rest, only functions that depend on time have events. Those whose values at 1024 times are
+/// the same there are taken to depend on the state alone.
 ///
 /// An event is a sign change along the motion. It is counted once, and if a run continues another one, in exactly one
 /// of the two:
@@ -225,7 +232,22 @@ impl Observer for Events<'_> {
         self.start_at(at, &(at.t, at.state.clone()))
     }
 
+    fn follows_rest(&mut self, from: &StepView<'_>, t_end: f64) -> bool {
+        let time = |k: usize| from.t + (t_end - from.t) * (k as f64 / TIMES_AT_REST as f64);
+        self.events.iter_mut().any(|event| {
+            let value = event.value(from.t, &from.state);
+            (1..=TIMES_AT_REST).any(|k| event.value(time(k), &from.state) != value)
+        })
+    }
+
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        if let (Some(rest), Some((from, state))) = (at.at_rest, &at.before) {
+            // What depends on time may change as fast as the motion did.
+            return rest.steps(*from, at.t).try_for_each(|ends| {
+                let ends = ends.map(|t| (t, state.clone()));
+                self.piece(at, &mut LastStep::new(ends, at.motion, at.stepper))
+            });
+        }
         let Some(mut step) = at.last_step() else { return ControlFlow::Continue(()) };
         if at.stepper.pieces().is_empty() {
             return self.piece(at, &mut step);

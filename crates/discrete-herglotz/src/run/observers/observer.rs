@@ -37,6 +37,13 @@ pub trait Observer {
     /// run.
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop>;
 
+    /// Whether it must see the time after the motion has come to rest in intervals of the length of a step or of some of
+    /// them, rather than at once: by default not. `from` is the view at the time of rest; the state does not change
+    /// until `t_end`, and no step is taken.
+    fn follows_rest(&mut self, _from: &StepView<'_>, _t_end: f64) -> bool {
+        false
+    }
+
     /// An observer that ends trial runs where this one ends its run, and has no other effect; `None`, the default, if
     /// it never ends a run. An accuracy is then not refused because of the motion after that end.
     fn terminal(&self) -> Option<Terminal<'_>> {
@@ -75,6 +82,9 @@ macro_rules! one_after_the_other {
                 $(self.$field.step(at)?;)+
                 ControlFlow::Continue(())
             }
+            fn follows_rest(&mut self, from: &StepView<'_>, t_end: f64) -> bool {
+                [$(self.$field.follows_rest(from, t_end)),+].contains(&true)
+            }
             fn terminal(&self) -> Option<Terminal<'_>> {
                 all_terminal([$(self.$field.terminal()),+])
             }
@@ -101,6 +111,9 @@ impl<O: Observer> Observer for Vec<O> {
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.iter_mut().try_for_each(|observer| observer.step(at))
     }
+    fn follows_rest(&mut self, from: &StepView<'_>, t_end: f64) -> bool {
+        self.iter_mut().any(|observer| observer.follows_rest(from, t_end))
+    }
     fn terminal(&self) -> Option<Terminal<'_>> {
         all_terminal(self.iter().map(Observer::terminal))
     }
@@ -125,6 +138,9 @@ impl<O: Observer> Observer for Borrowed<'_, O> {
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.0.step(at)
     }
+    fn follows_rest(&mut self, from: &StepView<'_>, t_end: f64) -> bool {
+        self.0.follows_rest(from, t_end)
+    }
     fn terminal(&self) -> Option<Terminal<'_>> {
         self.0.terminal()
     }
@@ -145,6 +161,9 @@ impl Observer for Box<dyn Observer + '_> {
     }
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         (**self).step(at)
+    }
+    fn follows_rest(&mut self, from: &StepView<'_>, t_end: f64) -> bool {
+        (**self).follows_rest(from, t_end)
     }
     fn terminal(&self) -> Option<Terminal<'_>> {
         (**self).terminal()

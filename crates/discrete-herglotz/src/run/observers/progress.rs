@@ -55,7 +55,7 @@ impl<F: FnMut(f64)> Observer for Progress<F> {
     }
 
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
-        if at.last || at.k.is_multiple_of(self.stride()) {
+        if at.last || at.at_rest.is_some() || at.k.is_multiple_of(self.stride()) {
             let RunInfo { t0, t_end, .. } = self.run;
             (self.report)(if at.last { 1.0 } else { (at.t - t0) / (t_end - t0) });
         }

@@ -165,7 +165,7 @@ impl<'f> Rows<'f> {
     /// Records the rows up to the time of the view.
     fn record_up_to(&mut self, at: &StepView<'_>) -> Result<(), StepError> {
         let (times, recorded) = match &self.when {
-            RowTimes::Every(stride) if at.k.is_multiple_of(*stride) || at.last => return self.record(at),
+            RowTimes::Every(stride) if at.ends_multiple_of(*stride) || at.last => return self.record(at),
             RowTimes::Every(_) => return Ok(()),
             RowTimes::At { times, recorded } => (times, *recorded),
         };

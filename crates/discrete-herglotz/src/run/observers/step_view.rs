@@ -1,6 +1,7 @@
 //! The view of a step for observers, and the request of an observer to end the run.
 
 use crate::integration::motion::Motion;
+use crate::run::at_rest::RestInterval;
 use crate::run::findings::Findings;
 use crate::run::observers::last_step::LastStep;
 use crate::run::resume_state::ResumeState;
@@ -51,6 +52,8 @@ pub struct StepView<'r> {
     pub(crate) stepper: &'r dyn Stepper,
     /// Whether the last step is a part of a step that failed as a whole.
     pub(crate) in_failed_step: bool,
+    /// If the view is that of an interval of time in which the motion is at rest: no step is taken in it.
+    pub(crate) at_rest: Option<RestInterval>,
 }
 
 impl<'r> StepView<'r> {
@@ -70,6 +73,16 @@ impl<'r> StepView<'r> {
         self.motion.velocity(t, state, self.stepper.last_velocity().as_ref())
     }
 
+    /// Whether the number of steps is a multiple of `stride` after the step that ends here.
+    pub(crate) fn ends_multiple_of(&self, stride: usize) -> bool {
+        self.at_rest.is_none() && self.k.is_multiple_of(stride)
+    }
+
+    /// Whether the motion has come to rest before: no step is taken any more, and the views are of intervals of time.
+    pub fn is_at_rest(&self) -> bool {
+        self.at_rest.is_some()
+    }
+
     /// The state from which [`Run::resume`](crate::run::Run::resume) continues the run; `None` if the stepper cannot be
     /// saved, or within a failed step.
     pub fn resume_state(&self) -> Option<ResumeState> {
@@ -78,14 +91,18 @@ impl<'r> StepView<'r> {
         }
         let (fingerprint, words) = (self.motion.fingerprint(), self.stepper.save()?);
         let Findings { unresolved, energy, .. } = self.findings;
-        let log_factor = self.log_factor.unwrap_or(0.0);
-        Some(ResumeState { fingerprint, taken: self.k, log_factor, unresolved, energy, words })
+        let (log_factor, rested_until) = (self.log_factor.unwrap_or(0.0), self.at_rest.map(|_| self.t));
+        Some(ResumeState { fingerprint, taken: self.k, log_factor, unresolved, energy, rested_until, words })
     }
 
     /// The view at a time within the last step; see [`LastStep::at`].
     pub(crate) fn within(&self, t: f64) -> Result<Self, StepError> {
         let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.step_to(t)?;
-        let log_factor = self.log_factor.map(|of_end| of_end - self.sigma.ln() + sigma.ln());
+        let log_factor = self.log_factor.map(|of_end| match self.at_rest {
+            // Over a long time `sigma_d` is below the smallest number.
+            Some(RestInterval { rate, .. }) => of_end - rate * (self.t - t),
+            None => of_end - self.sigma.ln() + sigma.ln(),
+        });
         Ok(StepView { t, state, sigma, log_factor, before: None, ..*self })
     }
 
