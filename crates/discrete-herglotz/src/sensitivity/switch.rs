@@ -168,9 +168,11 @@ impl Switch<'_, '_> {
         let moved = |part: f64| match along {
             Argument::Parameter(k) => {
                 let mut theta = problem.of.parameters();
-                theta[k] += part * distance * scale(theta[k].abs());
-                let of = |system: &dyn System| Some(vec![value(system, t, &x)]);
-                problem.of.with_parameters(&theta, &mut { of }).map_or(f64::NAN, |g| g[0]) - here
+                if let Some(theta) = theta.get_mut(k) {
+                    *theta += part * distance * scale(theta.abs());
+                }
+                let mut of = |system: &dyn System| self.function(system, t, &x);
+                problem.of.with_parameters(&theta, &mut of).map_or(f64::NAN, |g| g[0]) - here
             }
             _ => {
                 let (t, x) = moved(along, (t, &x), part * distance * scale(size(along, &x, self.h)));
@@ -183,7 +185,7 @@ impl Switch<'_, '_> {
         // The size of the terms of the function: its change with all positions.
         let grown = Point { q: &x.q * (1.0 + SIZE_DISTANCE) + &x.v * (SIZE_DISTANCE * self.h), ..x.clone() };
         let terms = (value(problem.system(), t, &grown) - here).abs() / SIZE_DISTANCE;
-        of_even.max(of_odd) > MIN_KINK * (after.abs() + before.abs()) + MAX_ROUNDINGS * f64::EPSILON * terms
+        max_or_nan(of_even, of_odd) > MIN_KINK * (after.abs() + before.abs()) + MAX_ROUNDINGS * f64::EPSILON * terms
     }
 
     /// The value of the switching function at a point.
