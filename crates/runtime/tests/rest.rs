@@ -201,7 +201,7 @@ fn the_state_of_rest_has_derivatives() {
         let mut loss = |states: &[_]| (states.len() as f64, vec![of_x.clone(), of_x.clone(), of_z.clone()]);
         let found = system.gradient(&motion, &times, &mut loss, &mut ()).unwrap();
         let (value, gradient) = found.loss.unwrap();
-        let parameters: Vec<f64> = gradient.parameters.iter().copied().collect();
+        let parameters: Vec<f64> = gradient.parameters.to_vec();
         assert_eq!((found.status, value), (Status::Completed, 3.0), "{way:?}");
         let close = parameters.iter().zip([2.0, 0.5, -0.125]).all(|(a, b)| (a - b).abs() < 1e-12);
         assert!(close && gradient.q[0].abs() < 1e-12 && gradient.t_end.abs() < 1e-12, "{way:?}: {gradient:?}");

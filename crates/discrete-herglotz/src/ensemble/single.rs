@@ -85,6 +85,14 @@ pub(crate) struct Common {
     pub rows: Option<usize>,
 }
 
+/// The plans of some members.
+pub struct LongestPlan {
+    /// A member with its step size and its number of steps, which is the largest one; the first error if none has a plan.
+    pub planned: Result<(usize, (f64, usize)), EnsembleError>,
+    /// Whether one of the members is expected to come to rest.
+    pub rests: bool,
+}
+
 impl Common {
     /// Runs a member with all checks of a run, and with an observer if there is one.
     pub fn run(
@@ -129,8 +137,7 @@ impl Common {
         self.rows.map_or(0, |stride| steps / stride.max(1) + 2)
     }
 
-    /// The plan with the most steps among those of some members, with the member, and whether one of them is expected to
-    /// come to rest; the first error if none has a plan.
+    /// The longest plan of some members.
     ///
     /// # Errors
     /// [`EnsembleError::Member`] with a false claim of structure, or an interruption.
@@ -139,7 +146,7 @@ impl Common {
         members: &dyn Members,
         sample: impl Iterator<Item = usize>,
         settings: (MemberSteps, Option<Interrupt<'_>>),
-    ) -> Result<(Result<(usize, (f64, usize)), EnsembleError>, bool), EnsembleError> {
+    ) -> Result<LongestPlan, EnsembleError> {
         let (mut planned, mut rests) = (Err(EnsembleError::Empty), false);
         for index in sample {
             let plan = self.plan(members, index, settings).map(|(plan, at_rest)| {
@@ -156,7 +163,7 @@ impl Common {
                 (Err(_), _) => {}
             }
         }
-        Ok((planned, rests))
+        Ok(LongestPlan { planned, rests })
     }
 
     /// The step size and the number of steps of the run of a member with these steps, and whether it is expected to come

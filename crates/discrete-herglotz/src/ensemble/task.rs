@@ -5,7 +5,7 @@ use crate::ensemble::lane::{Lane, LaneOptions, LaneStatus};
 use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::members::{LaneKernel, MemberSteps, Members};
 use crate::ensemble::settings::Settings;
-use crate::ensemble::single::Common;
+use crate::ensemble::single::{Common, LongestPlan};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::{branched, forget_branches};
 use crate::numbers::state_words::digest;
@@ -73,11 +73,12 @@ impl<'e> Task<'e> {
         }
         let longest_plan = |steps| common.longest_plan(members, settings.sample(), (steps, interrupt));
         let mut takes_lanes = members.batch_kernel().is_some() && !observed;
-        let (mut planned, rests) = longest_plan(if takes_lanes { MemberSteps::Common } else { MemberSteps::Own })?;
+        let LongestPlan { mut planned, rests } =
+            longest_plan(if takes_lanes { MemberSteps::Common } else { MemberSteps::Own })?;
         if planned.is_err() && takes_lanes && members.selects_integrator() {
             // Equal steps suit none of these members; runs of their own may have others.
             takes_lanes = false;
-            planned = longest_plan(MemberSteps::Own)?.0;
+            planned = longest_plan(MemberSteps::Own)?.planned;
         }
         takes_lanes &= !rests;
         if observed && let Err(EnsembleError::Member { index, cause: InputError::Accuracy { .. } }) = planned {

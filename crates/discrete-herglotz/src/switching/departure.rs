@@ -155,10 +155,8 @@ fn departure_near_kink(mut after: impl FnMut(f64) -> f64, dt: f64, noise: f64) -
     for dt in (0..=MAX_HALVINGS).map(|k| dt * f64::powi(0.5, k)) {
         let [later, earlier] = [dt, -dt].map(&mut after);
         let even = later + earlier;
-        if later.abs() > noise {
-            if sign(later) != side {
-                (side, since) = (sign(later), dt);
-            }
+        if later.abs() > noise && sign(later) != side {
+            (side, since) = (sign(later), dt);
         }
         if earlier.abs() > noise {
             before = sign(earlier);
