@@ -119,6 +119,12 @@ impl<const N: usize> FormulaSystem<N> for FormulaLagrangian<N> {
         if self.formula().constraints() == 0 {
             return Ok(None);
         }
+        // Before the integrator: none of them takes these.
+        let (mut switches, nowhere) = (Vec::new(), VelocityPoint::new([0.0; N], [0.0; N], 0.0));
+        Lagrangian::switching_functions(self, 0.0, &nowhere, &mut switches);
+        if !(switches.is_empty() && Lagrangian::breaks(self).is_empty()) {
+            return Err(InputError::KinksUnderConstraints);
+        }
         match by {
             None | Some(AnyIntegrator::Gauss { stages: 1..=7 } | AnyIntegrator::Splitting(_)) => {}
             Some(_) if self.proved().separable && !Lagrangian::has_force(self) => {}
