@@ -431,8 +431,8 @@ fn damaged_checkpoints_are_refused() {
         assert!(matches!(read(&other), Err(CheckpointError::Damaged)), "{place}");
     }
     let mut newer = whole.clone();
-    newer[8] = 4;
-    assert!(matches!(read(&newer), Err(CheckpointError::Version { found: 4 })));
+    newer[8] = 5;
+    assert!(matches!(read(&newer), Err(CheckpointError::Version { found: 5 })));
     std::fs::remove_file(path).unwrap();
     // A path that cannot be written to ends the run, with a status.
     let mut nowhere = Checkpoint::every(5, "/dev/null/checkpoint").unwrap();

@@ -90,7 +90,7 @@ impl<'p> TrialRuns<'_, 'p> {
     }
 
     /// The error that a change of the last digit of the start causes, where the distances of two runs that agree do not
-    /// exclude that it matters; otherwise 0. `run` repeats the coarse one.
+    /// exclude that it matters and the run asks for it; otherwise 0. `run` repeats the coarse one.
     ///
     /// # Errors
     /// [`SelectionFailure::IllConditioned`] if it exceeds the requested error.
@@ -99,6 +99,9 @@ impl<'p> TrialRuns<'_, 'p> {
         [coarse, fine]: [&Track; 2],
         run: impl Fn(&mut TrialRuns<'_, 'p>) -> Result<TrialEnd, InputError>,
     ) -> Result<f64, InputError> {
+        if self.request.needs.ill_conditioned {
+            return Ok(0.0);
+        }
         let State { q, p, .. } = &self.request.problem.state;
         // A motion that remains at its start is exact.
         let moves = coarse.states.iter().any(|x| x[0] != *q || x[1] != *p);

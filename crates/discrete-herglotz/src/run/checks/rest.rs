@@ -46,11 +46,17 @@ pub(crate) fn is_at_rest(
     !starts_at_rest(problem) && is_state_of_rest(problem, needs, (t, t_end), state)
 }
 
-/// Whether an accuracy is requested of a motion that starts at rest, with numbers below [`MAX_SIZE_AT_REST`], as from the
-/// end of another one: errors relative to it are undefined.
+/// Whether a motion that starts at rest, with numbers below [`MAX_SIZE_AT_REST`] as from the end of another one, decays below
+/// the smallest normal number: errors relative to it are undefined.
 pub(crate) fn remains_at_rest(problem: &SystemProblem<'_>, needs: OutputRequest, t_end: f64) -> bool {
-    let State { q, p, .. } = &problem.state;
-    max_or_nan(size(q), size(p)) > 0.0 && is_state_of_rest(problem, needs, (problem.t0, t_end), &problem.state)
+    let State { q, p, z } = &problem.state;
+    let (start, span) = (max_or_nan(size(q), size(p)), t_end - problem.t0);
+    let rate = || problem.system.gradient(problem.t0, &origin(problem, *z)).z;
+    // Written so that a NaN is no rest.
+    start > 0.0
+        && start < MAX_SIZE_AT_REST
+        && start * (0.5 * rate() * span).exp() < f64::MIN_POSITIVE
+        && is_state_of_rest(problem, needs, (problem.t0, t_end), &problem.state)
 }
 
 fn is_state_of_rest(problem: &SystemProblem<'_>, needs: OutputRequest, (t, t_end): (f64, f64), state: &State) -> bool {
