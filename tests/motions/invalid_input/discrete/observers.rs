@@ -256,10 +256,9 @@ fn odd_observers(report: &mut Report) {
         let [of_a, of_b] = [a, b].map(|(action, conformal_factor)| OutputRequest {
             action,
             conformal_factor,
-            saved: false,
-            derivatives: false,
+            ..OutputRequest::default()
         });
-        let both = OutputRequest { action: a.0 || b.0, conformal_factor: a.1 || b.1, saved: false, derivatives: false };
+        let both = OutputRequest { action: a.0 || b.0, conformal_factor: a.1 || b.1, ..OutputRequest::default() };
         report.check(of_a.and(of_b) == both, || format!("{of_a:?} and {of_b:?}"));
     }
 }
