@@ -3,12 +3,14 @@
 use crate::StepError;
 
 /// A step whose defect is far larger than that of any step that resolves the motion. It may have crossed a pole, a wall
-/// or a centre of force without evaluating the force there.
+/// or a centre of force without evaluating the force there. Where an accuracy was requested that the last digit of the
+/// start forbids, it is the first step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnresolvedStep {
     /// The first such step, counted from 0.
     pub step: usize,
-    /// The defect, in units of the largest defect of a step that resolves the motion; larger than one.
+    /// The defect, in units of the largest defect of a step that resolves the motion, or the error in units of the requested
+    /// one; larger than one.
     pub defect: f64,
 }
 
@@ -18,7 +20,7 @@ impl std::fmt::Display for UnresolvedStep {
         write!(
             f,
             "step {step} does not resolve the motion (defect {defect:.1e}), and later results may be wrong; take a \
-             smaller step"
+             smaller step, or a shorter time if the motion is chaotic"
         )
     }
 }

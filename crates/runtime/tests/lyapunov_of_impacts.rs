@@ -45,3 +45,18 @@ fn a_step_may_span_all_impacts() {
         assert!(found.exponents[1].abs() <= 1.0 / 40.0, "{found:?}");
     }
 }
+
+/// The last digit of the start decides where a billiard ends: the run is flagged, and its plan has the error.
+#[test]
+fn the_end_of_a_billiard_is_flagged() {
+    let system = billiard();
+    let motion = |end| {
+        let start = Start::new(0.0, [0.7, 0.2], [0.6, 0.8], 0.0);
+        Motion::new(start, end, StepControl::Accuracy { error: 1e-9, by: None })
+    };
+    for (end, is_decided) in [(5.0, false), (40.0, true)] {
+        let outcome = system.run(&motion(end), &mut ()).unwrap();
+        let error = system.plan(&motion(end)).unwrap().error.unwrap();
+        assert_eq!((outcome.unresolved.is_some(), error > 0.1), (is_decided, is_decided), "{end}: {error:e}");
+    }
+}

@@ -186,11 +186,6 @@ impl<'p, P> Run<'p, '_, P> {
         Ok(Run { needs: OutputRequest { action: true, derivatives: true, ..self.needs }, ..self })
     }
 
-    /// The same run for a motion whose growth is measured, which may be chaotic.
-    pub(crate) fn ill_conditioned(self) -> Self {
-        Run { needs: OutputRequest { ill_conditioned: true, ..self.needs }, ..self }
-    }
-
     /// Performs the run of a plan with one more observer, called after the others.
     pub(crate) fn observed(mut self, plan: &Plan<'p>, observer: &mut impl Observer) -> Result<Outcome, InputError> {
         let mut observers = std::mem::take(&mut self.observers);

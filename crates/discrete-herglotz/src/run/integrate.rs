@@ -9,6 +9,7 @@ use crate::run::observers::observer::Observer;
 use crate::run::observers::output_request::{OutputRequest, RunInfo};
 use crate::run::observers::step_view::{StepView, Stop};
 use crate::run::{Outcome, Plan, ResumeState};
+use crate::status::first;
 use crate::{InputError, State, Status, StepError, Stepper};
 
 /// The observers of a run, in the order in which they were added.
@@ -217,7 +218,7 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
         let Findings { log_factor, unresolved, .. } = checks.findings;
         Outcome {
             status: status.unwrap_or(Status::Completed),
-            unresolved: crate::status::first(unresolved, checks.unresolved_by(&*stepper)),
+            unresolved: first(plan.unreached_accuracy(), first(unresolved, checks.unresolved_by(&*stepper))),
             steps: taken,
             rests_from: rested_until.map(|_| stepper.time()),
             t,

@@ -6,7 +6,7 @@ use crate::run::discretization::Discretization;
 use crate::run::findings::Findings;
 use crate::run::observers::step_view::StepView;
 use crate::run::request::{Request, StepSelection};
-use crate::{InputError, MethodInfo, PlanEntry, State, Stepper};
+use crate::{InputError, MethodInfo, PlanEntry, State, Stepper, UnresolvedStep};
 use contact_geom::{Defect, Structure};
 use std::cell::Cell;
 use std::fmt::{Display, Formatter};
@@ -31,6 +31,8 @@ pub struct Plan<'p> {
     work_summary: Vec<PlanEntry>,
     /// Whether `sigma_d` is the same in all steps.
     pub(crate) constant_rate: bool,
+    /// The requested error.
+    pub(crate) requested: Option<f64>,
     /// Whether an error estimate was requested.
     pub(crate) estimated: bool,
     /// The number of steps after which the motion is expected to be at rest; no step is taken after that.
@@ -48,6 +50,7 @@ impl<'p> Plan<'p> {
             ends_after: selection.ended,
             work_summary: stepper.work_summary(),
             constant_rate: stepper.run_support().is_some_and(|run| run.has_constant_rate()),
+            requested: None,
             estimated: false,
             rests_after: None,
             start: Cell::new(Some(stepper)),
@@ -72,9 +75,16 @@ impl<'p> Plan<'p> {
         &self.steps.info
     }
 
-    /// The error of (q, p) and v that the trial runs found or predict; `None` if no accuracy was requested.
+    /// The error of (q, p) and v that the trial runs found or predict; `None` if no accuracy was requested. It exceeds the
+    /// requested error where the last digit of the start decides a motion with resets; outcomes are flagged then.
     pub fn error(&self) -> Option<f64> {
         self.steps.error
+    }
+
+    /// The flag of a run whose requested error is exceeded because the last digit of its start decides it.
+    pub(crate) fn unreached_accuracy(&self) -> Option<UnresolvedStep> {
+        let (error, requested) = self.steps.error.zip(self.requested)?;
+        (error > requested).then_some(UnresolvedStep { step: 0, defect: error / requested })
     }
 
     /// A stepper at the start, for programs that take the steps themselves. In transformed time use

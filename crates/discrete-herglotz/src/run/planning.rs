@@ -42,6 +42,7 @@ impl<'p> Request<'p> {
         let accuracy = matches!(length, StepControl::Accuracy(..));
         let times = if accuracy { CHECKED_TIMES_BEFORE_TRIAL_RUNS } else { CHECKED_TIMES };
         check_claims_over(&*problem.system, problem.t0, span, &problem.start, times)?;
+        let requested = if let StepControl::Accuracy(wanted, ..) = &length { Some(*wanted) } else { None };
         let (selection, rests_after) = match length {
             StepControl::Accuracy(wanted, select_steps, collocation) => {
                 self.within(wanted, select_steps, collocation, terminal)?
@@ -51,7 +52,7 @@ impl<'p> Request<'p> {
         };
         check_count(selection.count as f64)?;
         let mut plan = Plan::new(self, &selection)?;
-        plan.rests_after = rests_after;
+        (plan.rests_after, plan.requested) = (rests_after, requested);
         // If an accuracy was requested, the trial runs have made these checks.
         if plan.error().is_none() {
             plan.check_first_steps()?;

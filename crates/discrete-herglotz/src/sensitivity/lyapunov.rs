@@ -174,7 +174,7 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
             n if n > dimension => return Err(SensitivityError::Coordinate { index: n - 1, count: dimension }),
             _ => {}
         }
-        let run = self.differentiable()?.with_conformal_factor().ill_conditioned();
+        let run = self.differentiable()?.with_conformal_factor();
         let plan = run.plan(until)?;
         if plan.steps.info.constrained {
             // Of the 2n + 1 directions of the frame only those that are tangent to the constraints are of the motion.

@@ -90,18 +90,18 @@ impl<'p> TrialRuns<'_, 'p> {
     }
 
     /// The error that a change of the last digit of the start causes, where the distances of two runs that agree do not
-    /// exclude that it matters and the run asks for it; otherwise 0. `run` repeats the coarse one.
+    /// exclude that it matters; otherwise 0. `run` repeats the coarse one.
+    ///
+    /// It may exceed the requested error where the motion has resets: the flights between impacts are exact, and what is
+    /// measured of a chaotic one, as its exponents, is that of a neighbouring start. The outcome is flagged then.
     ///
     /// # Errors
-    /// [`SelectionFailure::IllConditioned`] if it exceeds the requested error.
+    /// [`SelectionFailure::IllConditioned`] if it exceeds the requested error of a motion without resets.
     pub fn error_of_last_digit(
         &mut self,
         [coarse, fine]: [&Track; 2],
         run: impl Fn(&mut TrialRuns<'_, 'p>) -> Result<TrialEnd, InputError>,
     ) -> Result<f64, InputError> {
-        if self.request.needs.ill_conditioned {
-            return Ok(0.0);
-        }
         let State { q, p, .. } = &self.request.problem.state;
         // A motion that remains at its start is exact.
         let moves = coarse.states.iter().any(|x| x[0] != *q || x[1] != *p);
@@ -116,6 +116,9 @@ impl<'p> TrialRuns<'_, 'p> {
         let distance = max_abs_or_nan(distances.iter().copied());
         if distance <= allowed {
             return Ok(distance.min(wanted));
+        }
+        if self.request.problem.system.hints().resets {
+            return Ok(distance);
         }
         let kept = distances.iter().take_while(|d| **d <= allowed).count();
         let Request { problem, span, .. } = self.request;

@@ -13,20 +13,12 @@ pub struct OutputRequest {
     /// Whether the run is differentiated, so that an integrator with derivatives is selected for an accuracy, and the stages
     /// of the parts of divided steps are kept.
     pub derivatives: bool,
-    /// Whether the last digit of the start may determine the end, as in a chaotic motion whose growth is measured: an
-    /// accuracy is then that of the steps alone.
-    pub ill_conditioned: bool,
 }
 
 impl OutputRequest {
     /// The action alone.
-    pub const ACTION: OutputRequest = OutputRequest {
-        action: true,
-        conformal_factor: false,
-        saved: false,
-        derivatives: false,
-        ill_conditioned: false,
-    };
+    pub const ACTION: OutputRequest =
+        OutputRequest { action: true, conformal_factor: false, saved: false, derivatives: false };
 
     /// The quantities of both requests.
     pub fn and(self, other: Self) -> Self {
@@ -35,7 +27,6 @@ impl OutputRequest {
             conformal_factor: self.conformal_factor || other.conformal_factor,
             saved: self.saved || other.saved,
             derivatives: self.derivatives || other.derivatives,
-            ill_conditioned: self.ill_conditioned || other.ill_conditioned,
         }
     }
 }
