@@ -4,7 +4,9 @@
 //! may agree with each other while that digit alone determines the motion. A run from a neighbouring start tells.
 
 use crate::integration::{InitialState, SystemProblem};
-use crate::run::accuracy::limits::{CERTAIN_ROUND_OFF, MIN_MEASURED_ERROR, ROUND_OFF_OF_A_STEP};
+use crate::run::accuracy::limits::{
+    CERTAIN_ROUND_OFF, MAX_REGULAR_GROWTH, MIN_MEASURED_ERROR, ROUND_OFF_OF_A_STEP, UNSEEN_GROWTH,
+};
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_end::TrialEnd;
 use crate::run::accuracy::trial_runs::TrialRuns;
@@ -106,7 +108,9 @@ impl<'p> TrialRuns<'_, 'p> {
         // A motion that remains at its start is exact.
         let moves = coarse.states.iter().any(|x| x[0] != *q || x[1] != *p);
         let growth = growth_of_distances(&coarse.distances(fine));
-        if !moves || f64::EPSILON * growth <= MIN_MEASURED_ERROR * self.wanted {
+        // What may have grown unseen is counted where there is growth at all.
+        let unseen = if growth > MAX_REGULAR_GROWTH { UNSEEN_GROWTH } else { 1.0 };
+        if !moves || f64::EPSILON * growth * unseen <= MIN_MEASURED_ERROR * self.wanted {
             return Ok(0.0);
         }
         let wanted = self.wanted;

@@ -222,8 +222,15 @@ pub(crate) const MAX_STAGNATING_RATIO: f64 = 0.7;
 pub(crate) const MAX_STAGNATIONS_FROM_REFERENCE: usize = 4;
 
 /// The error that the distances of runs predict for a change of the last digit of the start, in units of the requested
-/// error, from which it is measured: growth before the first comparison is not seen, nor that of single coordinates.
+/// error, from which it is measured: that of single coordinates is not seen.
 pub(crate) const MIN_MEASURED_ERROR: f64 = 0.01;
+
+/// The largest growth of distances, beyond the square of the time, that is none: of a regular motion.
+pub(crate) const MAX_REGULAR_GROWTH: f64 = 100.0;
+
+/// The growth that distances may have beside the one that is seen: ten before the first comparison, and a hundred by which
+/// the square of the time hides it.
+pub(crate) const UNSEEN_GROWTH: f64 = 1e3;
 
 // The cause for which runs do not agree.
 
