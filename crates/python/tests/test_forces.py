@@ -146,7 +146,7 @@ WRONG = {
     "twice": (PLANE | dict(L="force[x] = 1; L = (x'^2 + y'^2)/2", force={"x": "2"}), "the force on `x` is given twice"),
     "a wrong Rayleigh function": (PLANE | dict(rayleigh="x'^2 +"), "`rayleigh`: line 1"),
     "a list as Rayleigh's function": (PLANE | dict(rayleigh=[1.0]), r"`rayleigh` is \[1.0\]; it must be a formula"),
-    "a splitting": (PLANE | dict(force={"x": "-z*x'"}, integrator="strang", step=0.1), "there is a force.*gauss_8"),
+    "a splitting": (PLANE | dict(force={"x": "-z*x'"}, integrator="strang", step=0.1), "there is a force.*gauss_4"),
 }
 
 

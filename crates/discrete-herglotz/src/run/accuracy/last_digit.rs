@@ -11,6 +11,7 @@ use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_end::TrialEnd;
 use crate::run::accuracy::trial_runs::TrialRuns;
 use crate::run::request::Request;
+use crate::switching::has_switching_functions;
 use crate::{InputError, Point, SelectionFailure, State, Vector};
 use contact_geom::numbers::max_abs_or_nan;
 
@@ -121,7 +122,8 @@ impl<'p> TrialRuns<'_, 'p> {
         if distance <= allowed {
             return Ok(distance.min(wanted));
         }
-        if self.request.problem.system.hints().resets {
+        let SystemProblem { system, t0, start, .. } = &self.request.problem;
+        if system.hints().resets && has_switching_functions(&**system, *t0, start)? {
             return Ok(distance);
         }
         let kept = distances.iter().take_while(|d| **d <= allowed).count();
