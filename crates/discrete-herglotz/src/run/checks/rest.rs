@@ -46,8 +46,8 @@ pub(crate) fn is_at_rest(
     !starts_at_rest(problem) && is_state_of_rest(problem, needs, (t, t_end), state)
 }
 
-/// Whether a motion that starts at rest, with numbers below [`MAX_SIZE_AT_REST`] as from the end of another one, decays below
-/// the smallest normal number: errors relative to it are undefined.
+/// Whether a motion that starts at rest, with numbers below [`MAX_SIZE_AT_REST`] as from the end of another one, decays to
+/// zero in double precision: errors relative to it are undefined.
 pub(crate) fn remains_at_rest(problem: &SystemProblem<'_>, needs: OutputRequest, t_end: f64) -> bool {
     let State { q, p, z } = &problem.state;
     let (start, span) = (max_or_nan(size(q), size(p)), t_end - problem.t0);
@@ -55,7 +55,7 @@ pub(crate) fn remains_at_rest(problem: &SystemProblem<'_>, needs: OutputRequest,
     // Written so that a NaN is no rest.
     start > 0.0
         && start < MAX_SIZE_AT_REST
-        && start * (0.5 * rate() * span).exp() < f64::MIN_POSITIVE
+        && start * (0.5 * rate() * span).exp() == 0.0
         && is_state_of_rest(problem, needs, (problem.t0, t_end), &problem.state)
 }
 
