@@ -51,10 +51,11 @@ fn start_of(entry: &CatalogueEntry) -> Start {
 pub struct Seen {
     pub rows: Vec<Vec<f64>>,
     pub crossings: Vec<Crossing>,
-    nodes: usize,
+    /// The times of the nodes.
+    pub nodes: Vec<f64>,
     /// The number of polls after which the motion is ended.
-    polls: Option<usize>,
-    interrupted: Option<ResumeState>,
+    pub polls: Option<usize>,
+    pub interrupted: Option<ResumeState>,
 }
 
 impl RunMonitor for Seen {
@@ -66,8 +67,8 @@ impl RunMonitor for Seen {
         self.crossings.push(crossing.clone());
         ControlFlow::Continue(())
     }
-    fn node(&mut self, _t: f64, _x: [&[f64]; 3], _z: f64) {
-        self.nodes += 1;
+    fn node(&mut self, t: f64, _x: [&[f64]; 3], _z: f64) {
+        self.nodes.push(t);
     }
     fn poll(&mut self, _part: f64) -> ControlFlow<()> {
         match &mut self.polls {
@@ -104,7 +105,7 @@ fn a_run_is_that_of_the_typed_formula() {
     let problem = Problem::new(&typed, 0.0, VelocityPoint::new([1.0], [0.0], 0.0)).unwrap();
     let expected = problem.by(GAUSS).steps(Steps::Count(50)).run(Until::Time(20.0)).unwrap();
     assert_eq!((outcome.q[0], outcome.p[0], outcome.z), (expected.q[0], expected.p[0], expected.z));
-    assert_eq!((seen.nodes, seen.rows.len()), (51, 4));
+    assert_eq!((seen.nodes.len(), seen.rows.len()), (51, 4));
     let last = &seen.rows[3];
     assert_eq!([last[0], last[1], last[3]], [20.0, expected.q[0], expected.p[0]]);
     assert_eq!(last[6], (2.0f64).exp() * last[1] * last[2]);

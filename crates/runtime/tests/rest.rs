@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+use crate::motions::Seen;
 use formula_lagrangian::{Formula, Reset};
 use herglotz_runtime::{
-    AnyIntegrator, Column, Crossing, EndCovector, Ensemble, Event, MemberEnd, Motion, MotionFit, OutputTimes,
-    ResumeState, RunMonitor, Series, Start, Status, StepControl, Steps, System, Unknown,
+    AnyIntegrator, Column, Crossing, EndCovector, Ensemble, Event, MemberEnd, Motion, MotionFit, OutputTimes, Series,
+    Start, Status, StepControl, Steps, System, Unknown,
 };
-use std::ops::ControlFlow;
 
 /// An oscillator about `a` = 0 with drag, whose action tends to `c/g` as it comes to rest.
 const FORMULA: &str = "x'^2/2 - (x - a)^2/2 + c - g*z";
@@ -34,41 +34,6 @@ fn motion(end: f64, way: StepControl) -> Motion {
 
 fn columns(of: &Formula) -> Vec<Column> {
     ["t", "x", "x'", "z", "energy", "log_factor"].iter().map(|text| Column::parse(text, of).unwrap()).collect()
-}
-
-#[derive(Default)]
-struct Seen {
-    rows: Vec<Vec<f64>>,
-    crossings: Vec<Crossing>,
-    nodes: Vec<f64>,
-    /// The number of polls after which the motion is interrupted.
-    polls: Option<usize>,
-    interrupted: Option<ResumeState>,
-}
-
-impl RunMonitor for Seen {
-    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
-        self.rows.push(numbers.to_vec());
-        ControlFlow::Continue(())
-    }
-    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
-        self.crossings.push(crossing.clone());
-        ControlFlow::Continue(())
-    }
-    fn node(&mut self, t: f64, _x: [&[f64]; 3], _z: f64) {
-        self.nodes.push(t);
-    }
-    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
-        match &mut self.polls {
-            Some(0) => return ControlFlow::Break(()),
-            Some(left) => *left -= 1,
-            None => {}
-        }
-        ControlFlow::Continue(())
-    }
-    fn interrupted(&mut self, at: ResumeState) {
-        self.interrupted = Some(at);
-    }
 }
 
 /// Rows after rest are the state of rest: `x = 0`, `z = c/g`, and a conformal factor that still decreases.
@@ -335,7 +300,7 @@ fn members_at_rest_are_completed() {
             let mut members: Vec<MemberEnd> = Vec::new();
             let tally = system.ensemble(&ensemble, &mut |member| {
                 members.push(member);
-                ControlFlow::Continue(())
+                std::ops::ControlFlow::Continue(())
             });
             assert_eq!(tally.unwrap().completed, 3, "{way:?}");
             for member in members {

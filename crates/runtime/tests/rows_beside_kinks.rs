@@ -53,3 +53,32 @@ fn rows_of_a_motion_with_quadratic_damping() {
         }
     }
 }
+
+/// A reflection at a step of the potential changes the sign of the velocity, and so that of the drag at the same point: the
+/// action has its derivatives there, on whichever side of the step rounding puts the point.
+#[test]
+fn a_reflection_beside_quadratic_damping() {
+    let formula = Formula::parse("x'^2/2 - if(x > a, 0.5, 0) + 0.05*z", &["x"], &[("a", 0.3)]).unwrap();
+    let system = System::new(&formula.with_force("x", "-0.4*x'*abs(x')").unwrap()).unwrap();
+    let by = StepControl::Steps { by: AnyIntegrator::Gauss { stages: 8 }, steps: Steps::Size(0.25) };
+    let motion = |v: f64| Motion::new(Start::new(0.0, [-0.1], [v], 0.2), 2.0, by);
+    let end = |v: f64| {
+        let outcome = system.run(&motion(v), &mut ()).unwrap();
+        [outcome.q[0], outcome.v.unwrap()[0], outcome.z.unwrap()]
+    };
+    for k in 0..60 {
+        let v = 0.5 + 0.006 * f64::from(k);
+        let found = system.sensitivity(&motion(v), &["x'"], &[2.0], &mut ()).unwrap();
+        let found = &found.rows[0][0];
+        let h = 1e-3;
+        let [a, b, c, d] = [-2.0 * h, -h, h, 2.0 * h].map(|by| end(v + by));
+        let mut loss = |_: &[_]| (0.0, vec![EndCovector { z: 1.0, ..EndCovector::zero(1) }]);
+        let gradient = system.gradient(&motion(v), &[2.0], &mut loss, &mut ()).unwrap().loss.unwrap().1;
+        assert!((gradient.rate[0] - found.z).abs() <= 1e-12, "{v}: {} for {}", gradient.rate[0], found.z);
+        for (i, of) in [found.q[0], found.v[0], found.z].into_iter().enumerate() {
+            let expected = (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h);
+            // The differences have errors of order h^4, and of the runs, 1e-14, divided by h.
+            assert!((of - expected).abs() <= 1e-9, "{v}, {i}: {of} for {expected}");
+        }
+    }
+}

@@ -14,8 +14,9 @@ use crate::sensitivity::columns::{Column, Covector};
 use crate::sensitivity::parametric_system::Differentiable;
 use crate::sensitivity::switch::difference_in_parameter;
 use crate::switching::stepper::parts::time_spacing;
+use crate::switching::{phase_point, rates_along_motion};
 use crate::system::AtState;
-use crate::{Components, State, StepError, System};
+use crate::{Components, Point, State, StepError, System};
 use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::BreakRate;
 
@@ -156,11 +157,12 @@ impl<'r, 'p> TimeJumps<'r, 'p> {
     }
 
     /// The rates over such a part, on the side of the surfaces through its point on which the motion is: before one that it
-    /// passes at its end, otherwise after those that it has passed. A jump in time there is passed after such parts.
+    /// passes at its end, otherwise after those that it has passed, or that the change of the state there makes it pass. A
+    /// jump in time there is passed after such parts.
     pub fn rates_at_once(&self, part: &SolvedPart) -> Result<Components, StepError> {
         let at = &part.from;
         let direction = match part.end {
-            PartEnd::Switch { .. } => -1.0,
+            PartEnd::Switch { index, rising, .. } if !self.is_crossed_by_change(at, index, rising) => -1.0,
             _ if self.at_start(at.t, 1).is_some() => return at.rates(self.before(at.t), self.steps),
             _ => 1.0,
         };
@@ -174,6 +176,19 @@ impl<'r, 'p> TimeJumps<'r, 'p> {
             sum = sum.plus(&moved.rates(moved.t, self.steps)?.scale(weight));
         }
         Ok(sum)
+    }
+
+    /// Whether a switching function has the sign that it has after its zero also on the motion shortly before a point at
+    /// which the state has changed: a reflection, for example, changes the sign of the velocity.
+    fn is_crossed_by_change(&self, at: &PartPoint, index: usize, rising: bool) -> bool {
+        let system = self.problem.system();
+        let x = if self.problem.is_hamiltonian() { phase_point(&at.state) } else { at.point() };
+        let Some(field) = rates_along_motion(system, at.t, &x) else { return false };
+        let by = -SHORTLY * self.steps.h;
+        let before = Point { q: x.q + field.x * by, v: x.v + field.y * by, z: x.z + field.z * by };
+        let mut values = Vec::new();
+        system.switching_functions(at.t + by, &before, &mut values);
+        values.get(index).is_some_and(|g| if rising { *g > 0.0 } else { *g < 0.0 })
     }
 
     /// Their derivatives in some parameters at a point of the motion, with the change of the rates where it is wanted.

@@ -9,8 +9,8 @@ use herglotz_runtime::{Event, Motion, Outcome, Start, StepControl, System};
 /// The side of the box.
 const SIDE: f64 = 4.5;
 
-/// The accuracy of a position after some twenty impacts: each is located, and a flight between two walls is told from
-/// none, to some hundred roundings of positions of this size.
+/// The accuracy of a position after some twenty impacts: each is located to some hundred roundings of positions of this
+/// size, and so is the end of a flight between two walls.
 const ROUND_OFF: f64 = 20.0 * 100.0 * f64::EPSILON * SIDE;
 
 fn by(name: &str, h: f64) -> StepControl {
