@@ -247,12 +247,18 @@ fn slopes(problem: &Problem, name: &str, times: &[f64]) -> Option<Vec<f64>> {
             false => found.rows.iter().map(|row| row[0]).collect(),
         })
     };
-    let [a, b, c, d] = [at(-2.0)?, at(-1.0)?, at(1.0)?, at(2.0)?];
-    // Differences of two lengths agree where nothing in between is touched.
-    let wide: Vec<f64> = a.iter().zip(&d).map(|(a, d)| (d - a) / (4.0 * h)).collect();
-    let narrow: Vec<f64> = b.iter().zip(&c).map(|(b, c)| (c - b) / (2.0 * h)).collect();
-    let close = wide.iter().zip(&narrow).all(|(a, b)| (a - b).abs() < 1e-5 * (1.0 + a.abs()));
-    close.then(|| wide.iter().zip(&narrow).map(|(wide, narrow)| (4.0 * narrow - wide) / 3.0).collect())
+    let slope = |i: f64| {
+        let (after, before) = (at(i)?, at(-i)?);
+        Some(after.iter().zip(&before).map(|(after, before)| (after - before) / (2.0 * i * h)).collect::<Vec<f64>>())
+    };
+    let (wide, middle, narrow) = (slope(2.0)?, slope(1.0)?, slope(0.5)?);
+    let order_four = |wide: &[f64], narrow: &[f64]| -> Vec<f64> {
+        wide.iter().zip(narrow).map(|(wide, narrow)| (4.0 * narrow - wide) / 3.0).collect()
+    };
+    let (rough, fine) = (order_four(&wide, &middle), order_four(&middle, &narrow));
+    // Differences of two lengths agree where nothing in between is touched, to a tenth of what is asked of derivatives.
+    let close = rough.iter().zip(&fine).all(|(a, b)| (a - b).abs() < 1e-7 * (1.0 + a.abs()));
+    close.then_some(fine)
 }
 
 fn sensitivity(problem: &Problem, system: &System, names: &[String; 2]) -> Result<(), Verdict> {
@@ -279,13 +285,19 @@ fn fit(problem: &Problem, system: &System, name: &str, times: &[f64]) -> Result<
     let (Some((truth, _)), Some(slopes)) = (conditioned(problem, times), slopes(problem, name, times)) else {
         return Err(Sensitive);
     };
-    // The data hold the parameter, and the search passes no other event.
+    // The data hold the parameter, the search passes no other event, and there is no other minimum on its way.
     let strength = slopes.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
-    let started = problem.with(name, guess);
-    let near = motion(&started, (0.0, started.start), times, None);
-    if strength < 0.1 || near.is_none_or(|near| near.impacts.len() != truth.impacts.len()) {
+    let misfit = |part: f64| {
+        let changed = problem.with(name, value + part * (guess - value));
+        let near = motion(&changed, (0.0, changed.start), times, None)?;
+        let rows = near.rows.iter().zip(&truth.rows).map(|(a, b)| (a[0] - b[0]).powi(2));
+        (near.impacts.len() == truth.impacts.len()).then(|| rows.sum::<f64>())
+    };
+    let misfits: Option<Vec<f64>> = (1..=10).map(|k| misfit(0.1 * f64::from(k))).collect();
+    if strength < 0.1 || misfits.is_none_or(|misfits| misfits.windows(2).any(|pair| pair[1] <= pair[0])) {
         return Err(Sensitive);
     }
+    let started = problem.with(name, guess);
     let values = truth.rows.iter().map(|row| row[0]).collect();
     let data = Series { quantity: "x".into(), times: times.to_vec(), values, deviations: None };
     let request = MotionFit::new(started.motion(system), [Unknown::free(name)], [data]);
