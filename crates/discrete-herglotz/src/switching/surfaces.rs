@@ -159,13 +159,17 @@ impl Surfaces {
             }
             let tolerance = self.rounding(system, index, (t, x), h);
             let Some(Departure { side, .. }) = self.departure(system, index, (t, x), h, tolerance) else { continue };
+            let AtSwitch::Replace { to, .. } = system.at_switch(index, t, x, side > 0.0) else {
+                self.set_side(index, side);
+                continue;
+            };
             // A run that ended here has made the reset only if its end was beyond the surface by more than the round-off
-            // of its own numbers.
-            let is_ahead = side * value < 0.0 || self.is_on_without_motion(system, index, (t, x));
-            let resets = is_ahead && has_reset(system, index, (t, x), side > 0.0);
-            if let Some(of) = self.sides.get_mut(index) {
-                *of = if resets { -side } else { side };
-            }
+            // of its own numbers; a reset that turns the motion back it has not made, since the motion goes on.
+            let turns_back = |after: Departure| after.side * side < 0.0;
+            let resets = side * value < 0.0
+                || self.is_on_without_motion(system, index, (t, x))
+                || self.departure(system, index, (t, &to), h, tolerance).is_some_and(turns_back);
+            self.set_side(index, if resets { -side } else { side });
         }
     }
 
@@ -211,6 +215,12 @@ impl Surfaces {
 
     pub fn side(&self, index: usize) -> f64 {
         self.sides.get(index).copied().unwrap_or(0.0)
+    }
+
+    fn set_side(&mut self, index: usize, side: f64) {
+        if let Some(of) = self.sides.get_mut(index) {
+            *of = side;
+        }
     }
 
     /// Sets the motion on the other side of a surface.
