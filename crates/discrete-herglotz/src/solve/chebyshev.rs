@@ -92,6 +92,11 @@ impl Samples {
         self.values().iter().all(|value| value.is_finite())
     }
 
+    /// Replaces the value at the start of the interval.
+    pub fn set_start(&mut self, value: f64) {
+        self.values[0] = value;
+    }
+
     /// Replaces the value at the end of the interval.
     pub fn set_end(&mut self, value: f64) {
         self.values[self.degree] = value;

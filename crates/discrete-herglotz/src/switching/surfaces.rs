@@ -292,6 +292,10 @@ impl Surfaces {
             if side * end > 0.0 && has_no_zero(&samples, 0.0) {
                 continue;
             }
+            if side * samples.ends()[0] < 0.0 {
+                // The motion starts on the surface, beyond it by round-off.
+                samples.set_start(0.0);
+            }
             if let Some(h) = ends_on_zeros
                 && self.is_on(system, index, (curve.to.t, &curve.to.argument(system)), h)
             {

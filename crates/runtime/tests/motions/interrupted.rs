@@ -256,6 +256,9 @@ fn a_reset_just_after_the_start_occurs() {
     let wall = 0.43871965452303385;
     let free = Formula::parse("x'^2/2", &["x"], &[("a", wall)]).unwrap();
     let bounce = free.with_impact("x - a", Impact::Elastic, None).unwrap();
+    // Without the wall, the motion would return within the first step.
+    let pushed = Formula::parse("x'^2/2 + x", &["x"], &[("a", wall)]).unwrap();
+    let pushed = pushed.with_impact("x - a", Impact::Elastic, None).unwrap();
     let near = |ulps: i64| f64::from_bits(f64::to_bits(wall).checked_add_signed(ulps).unwrap());
     for ulps in (-80..80).chain([100, 150, 1000, 100_000]) {
         let x = near(ulps);
@@ -268,6 +271,14 @@ fn a_reset_just_after_the_start_occurs() {
             // The round-off of 300 steps.
             assert!(resets == 1 && (outcome.q[0] - bounced).abs() <= 1e-12, "{ulps} ulps by {by:?}: {outcome:?}");
         }
+        // At the wall, or beyond it by no more than the round-off of x.
+        if !(-28..=0).contains(&ulps) {
+            continue;
+        }
+        let start = Start::new(0.33, [x], [-0.3], 0.0);
+        let (outcome, resets) = with_resets(&pushed, start, 3.33, by_steps(8, 1.0));
+        let bounced = 2.0 * wall - x + 3.0 * 0.3 + 4.5;
+        assert!(resets == 1 && (outcome.q[0] - bounced).abs() <= 1e-12, "{ulps} ulps, pushed: {outcome:?}");
     }
 }
 
