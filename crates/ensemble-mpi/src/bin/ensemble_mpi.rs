@@ -82,6 +82,12 @@ impl Table {
     }
 }
 
+/// Writes a message to stderr at once, so that those of several ranks are not mixed.
+fn report(message: &str) {
+    // Nothing can be told if stderr is closed.
+    let _ = io::stderr().write_all(message.as_bytes());
+}
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let Some(universe) = mpi::initialize() else { return ExitCode::from(2) };
@@ -112,7 +118,7 @@ fn main() -> ExitCode {
         Ok(None) => return ExitCode::SUCCESS,
         Err(cause) => {
             if world.rank() == 0 || matches!(cause, MpiError::Ensemble(_)) {
-                eprintln!("error: rank {}: {cause}", world.rank());
+                report(&format!("error: rank {}: {cause}\n", world.rank()));
             }
             if matches!(cause, MpiError::RankLost { .. }) {
                 world.abort(2);
@@ -121,7 +127,7 @@ fn main() -> ExitCode {
         }
     };
     if let Err(cause) = written.and_then(|()| table.finish(&arguments.out)) {
-        eprintln!("error: {}: {cause}", arguments.out.display());
+        report(&format!("error: {}: {cause}\n", arguments.out.display()));
         return ExitCode::FAILURE;
     }
     let tally = merged.tally;
