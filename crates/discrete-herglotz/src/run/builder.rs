@@ -155,7 +155,9 @@ impl<'p, 'o, P> Run<'p, 'o, P> {
             return Err(InputError::Scale { index, scale: scales[index] });
         }
         let (integrator, scales, parts) = (self.integrator.clone(), self.scales.clone(), self.parts.clone());
-        let request = Request { problem: self.system.clone(), t_end, span, integrator, needs, scales, parts };
+        let ends_only = self.from.is_none() && self.observers.sees_only_the_ends();
+        let request =
+            Request { problem: self.system.clone(), t_end, span, integrator, needs, scales, parts, ends_only };
         let terminal = if let StepControl::Accuracy(..) = length { self.observers.terminal() } else { None };
         let mut plan = request.plan(length, terminal)?;
         plan.estimated = self.estimated;

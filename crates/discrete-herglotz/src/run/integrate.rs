@@ -24,6 +24,7 @@ pub(crate) fn integrate(
 ) -> Result<Outcome, InputError> {
     let mut run = Integration::new(plan, observers, from)?;
     run.start();
+    run.take_over(plan.take_end());
     while run.status.is_none() && !run.over {
         let first = run.taken;
         let before = run.needs_start().then(|| (run.stepper.time(), run.stepper.state()));
@@ -142,6 +143,21 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
     /// Whether the state before the next step is needed.
     fn needs_start(&self) -> bool {
         self.checks.needs_start(self.taken) || self.next_observed(self.taken) == self.taken + 1
+    }
+
+    /// Ends the run with the end of a trial run that took the same steps: nothing between was observed or checked.
+    fn take_over(&mut self, end: Option<Box<dyn Stepper + 'p>>) {
+        let Some(stepper) = end.filter(|_| self.taken == 0 && self.status.is_none() && !self.over) else { return };
+        self.stepper = stepper;
+        self.taken = self.plan.steps.count;
+        self.checks.multiply(self.taken, self.taken, self.stepper.sigma());
+        self.over = true;
+        let mut step =
+            TakenSteps { stepper: &mut *self.stepper, before: None, first: 0, taken: self.taken, over: true };
+        self.status = self.checks.check(&mut step);
+        if self.status.is_none() {
+            self.observe(0, None);
+        }
     }
 
     fn advance(&mut self, chunk: usize) -> Result<(), StepError> {

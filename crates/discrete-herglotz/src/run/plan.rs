@@ -39,12 +39,15 @@ pub struct Plan<'p> {
     pub(crate) rests_after: Option<usize>,
     /// A stepper at the start, for the first run of the plan.
     start: Cell<Option<Box<dyn Stepper + 'p>>>,
+    /// The stepper of the trial run with these steps, at its end: the first run of the plan is that run.
+    end: Cell<Option<Box<dyn Stepper + 'p>>>,
 }
 
 impl<'p> Plan<'p> {
     /// The plan of a request with its selected steps.
-    pub(crate) fn new(request: &Request<'p>, selection: &StepSelection<'p>) -> Result<Self, InputError> {
-        let steps = Discretization::new(request, selection)?;
+    pub(crate) fn new(request: &Request<'p>, selection: StepSelection<'p>) -> Result<Self, InputError> {
+        let steps = Discretization::new(request, &selection)?;
+        let end = selection.end.filter(|_| steps.problem_for_steps().structure == steps.problem.structure);
         let stepper = steps.stepper(steps.error.is_none())?;
         Ok(Plan {
             ends_after: selection.ended,
@@ -54,6 +57,7 @@ impl<'p> Plan<'p> {
             estimated: false,
             rests_after: None,
             start: Cell::new(Some(stepper)),
+            end: Cell::new(end),
             steps,
         })
     }
@@ -100,6 +104,11 @@ impl<'p> Plan<'p> {
     /// The stepper for a run of the plan; the first run takes the one that was created with the plan.
     pub(crate) fn take_stepper(&self) -> Result<Box<dyn Stepper + 'p>, InputError> {
         self.start.take().map_or_else(|| self.steps.stepper(self.steps.error.is_none()), Ok)
+    }
+
+    /// The stepper of the trial run that the run is.
+    pub(crate) fn take_end(&self) -> Option<Box<dyn Stepper + 'p>> {
+        self.end.take()
     }
 
     /// The view of the observers after `k` steps.

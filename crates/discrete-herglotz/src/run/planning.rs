@@ -2,6 +2,7 @@
 
 use crate::InputError;
 use crate::integration::check_claims::check_claims_over;
+use crate::integration::is_separable;
 use crate::run::Plan;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::DEFAULT_STAGES;
@@ -51,7 +52,7 @@ impl<'p> Request<'p> {
             StepControl::Exactly(count, h) => (StepSelection { h, ..self.given(Steps::Count(count))? }, None),
         };
         check_count(selection.count as f64)?;
-        let mut plan = Plan::new(self, &selection)?;
+        let mut plan = Plan::new(self, selection)?;
         (plan.rests_after, plan.requested) = (rests_after, requested);
         // If an accuracy was requested, the trial runs have made these checks.
         if plan.error().is_none() {
@@ -74,13 +75,14 @@ impl<'p> Request<'p> {
             let count = first_guess(self, DEFAULT_STAGES, wanted);
             let h = self.span / count as f64;
             let integrator = self.integrator.clone().unwrap_or_else(|| collocation.gauss(DEFAULT_STAGES));
-            return Ok((StepSelection { integrator, count, h, error: Some(0.0), ended: None }, Some(0)));
+            return Ok((StepSelection { integrator, count, h, error: Some(0.0), ended: None, end: None }, Some(0)));
         }
         let Some(t_end) = self.time_of_rest(collocation.clone()) else {
             return Ok((select_steps(self, wanted, collocation, terminal)?, None));
         };
         let span = t_end - self.problem.t0;
-        let moving = select_steps(&Request { t_end, span, ..self.clone() }, wanted, collocation, terminal)?;
+        let until_rest = Request { t_end, span, ends_only: false, ..self.clone() };
+        let moving = select_steps(&until_rest, wanted, collocation, terminal)?;
         let (ended, rests_after) = (moving.ended, Some(moving.count));
         Ok((StepSelection { ended, ..moving.extended_by(self.span / span) }, rests_after))
     }
@@ -99,7 +101,7 @@ impl<'p> Request<'p> {
         integrator.check()?;
         // The stepper needs a nonzero step size, although it takes no step.
         let h = f64::EPSILON * max_or_nan(self.problem.t0.abs(), 1.0);
-        Plan::new(self, &StepSelection { integrator, count: 0, h, error, ended: None })
+        Plan::new(self, StepSelection { integrator, count: 0, h, error, ended: None, end: None })
     }
 
     /// The given steps of the given integrator.
@@ -113,6 +115,7 @@ impl<'p> Request<'p> {
             h: span / count as f64,
             error: None,
             ended: None,
+            end: None,
         };
         match (steps, rate) {
             (Steps::Count(0), _) => Err(NO_STEP),
@@ -138,6 +141,20 @@ impl<'p> Request<'p> {
     /// Whether the motion is under constraints: the free motion of the Lagrangian tells nothing about it.
     pub(crate) fn is_constrained(&self) -> bool {
         self.integrator.as_ref().is_some_and(|integrator| integrator.info().constrained)
+    }
+
+    /// Whether steps of Gauss collocation iterate the accelerations alone: L is separable, with a constant rate.
+    pub(crate) fn iterates_accelerations(&self) -> bool {
+        let structure = &self.problem.structure;
+        is_separable(&*self.problem.system, structure) && structure.has_constant_rate()
+    }
+
+    /// Whether a trial run may be the run itself: it computes the state at the end alone, and perhaps the action.
+    pub(crate) fn may_be_a_trial_run(&self) -> bool {
+        let OutputRequest { conformal_factor, saved, derivatives, .. } = self.needs;
+        // Claims that are not proved are checked along the run.
+        let proved = self.problem.system.hints().proved;
+        self.ends_only && proved && !conformal_factor && !saved && !derivatives
     }
 
     /// The same request without action and conformal factor.

@@ -4,7 +4,7 @@ use crate::integration::{SharedIntegrator, SystemProblem};
 use crate::run::observers::observer::Terminal;
 use crate::run::observers::output_request::OutputRequest;
 use crate::switching::Collocation;
-use crate::{InputError, Vector};
+use crate::{InputError, Stepper, Vector};
 
 /// The time steps of a run. If the run goes backward in time, so do its steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,10 +54,11 @@ pub(crate) struct Request<'p> {
     pub scales: Option<Vector>,
     /// The collocation steppers of a Lagrangian with switching functions, for parts of steps.
     pub parts: Option<Collocation<'p>>,
+    /// Whether nothing but the start and the end of the run is observed, so that a trial run may be the run.
+    pub ends_only: bool,
 }
 
 /// The integrator and the steps that are selected for a run.
-#[derive(Clone)]
 pub(crate) struct StepSelection<'p> {
     pub integrator: SharedIntegrator<'p>,
     pub count: usize,
@@ -67,6 +68,8 @@ pub(crate) struct StepSelection<'p> {
     pub error: Option<f64>,
     /// The number of steps after which an observer is expected to end the run, if the steps fill a longer span.
     pub ended: Option<usize>,
+    /// The stepper of a trial run with these steps, at the end of the span.
+    pub end: Option<Box<dyn Stepper + 'p>>,
 }
 
 /// The largest number of steps: up to it `t0 + k h` resolves times to a thousandth of a step.

@@ -26,6 +26,8 @@ pub(super) struct Recorder<'r> {
     numbers: Vec<f64>,
     crossings: Option<Crossings<'r>>,
     nodes: bool,
+    /// Whether there are no rows between the start and the end of the motion.
+    rows_at_ends: bool,
     needs: OutputRequest,
     run_info: Option<RunInfo>,
     dimension: usize,
@@ -52,6 +54,11 @@ impl<'r> Recorder<'r> {
             numbers: Vec::with_capacity(columns.len()),
             crossings,
             nodes: motion.nodes,
+            rows_at_ends: match &motion.rows {
+                None => true,
+                Some(OutputTimes::Every(_)) => false,
+                Some(OutputTimes::At(times)) => times.iter().all(|t| *t == motion.start.t || *t == motion.end),
+            },
             needs: of_rows.and(of_all),
             run_info: None,
             dimension: lagrangian.formula().dimension(),
@@ -390,6 +397,10 @@ impl Observer for Recorder<'_> {
 
     fn follows_rest(&mut self, _from: &StepView<'_>, _t_end: f64) -> bool {
         self.crossings.as_ref().is_some_and(Crossings::follows_rest)
+    }
+
+    fn sees_only_the_ends(&self) -> bool {
+        !self.nodes && self.crossings.is_none() && self.rows_at_ends
     }
 
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {

@@ -70,6 +70,26 @@ impl Piece<'_> {
         above[7]
     }
 
+    /// The parts of a step at which it is seen whether the motion has left the sides of the piece: the middle, the end, and
+    /// where it is nearest to a surface from which it turns away.
+    fn searched(&self, t: f64, y: [f64; 3], h: f64) -> Vec<f64> {
+        let mut parts = vec![0.5, 1.0];
+        for (.., surface) in self.surfaces() {
+            let rate = |part: f64| surface.rate(t + part * h, self.step(t, y, part * h));
+            let (mut before, mut after) = (0.0, 1.0);
+            if surface.rate(t, y) * rate(after) >= 0.0 {
+                continue;
+            }
+            for _ in 0..30 {
+                let middle = (before + after) / 2.0;
+                if rate(middle) * rate(after) > 0.0 { after = middle } else { before = middle }
+            }
+            parts.push(after);
+        }
+        parts.sort_by(f64::total_cmp);
+        parts
+    }
+
     /// Whether the motion has left the sides of the piece.
     fn is_left(&self, t: f64, y: [f64; 3]) -> bool {
         self.surfaces().any(|(i, j, surface)| surface.function(t, y) * self.sides[i][j] < 0.0)
@@ -85,6 +105,15 @@ impl Piece<'_> {
 impl Surface {
     fn is_of_velocity(self) -> bool {
         matches!(self, Surface::Rest | Surface::End(None))
+    }
+
+    /// The rate of the function of a surface of positions; 0 for others.
+    fn rate(self, t: f64, [_, v, _]: [f64; 3]) -> f64 {
+        match self {
+            Surface::Position(_) | Surface::Step { .. } | Surface::End(Some(_)) => v,
+            Surface::Wall { b, w, .. } => v - b * w * (w * t).cos(),
+            Surface::Rest | Surface::End(None) => 0.0,
+        }
     }
 
     /// Its function, which changes its sign where the motion crosses it.
@@ -125,12 +154,13 @@ pub fn motion(
             let h = STEP.min(cut - t);
             found.farthest = found.farthest.max(y[0].abs());
             let to = |part: f64| piece.step(t, y, part * h);
-            let Some(outside) = [0.5, 1.0].into_iter().find(|part| piece.is_left(t + *part * h, to(*part))) else {
+            let parts = piece.searched(t, y, h);
+            let Some(i) = parts.iter().position(|part| piece.is_left(t + *part * h, to(*part))) else {
                 y = to(1.0);
                 t = if h == cut - t { cut } else { t + h };
                 continue;
             };
-            let (mut inside, mut outside) = (outside - 0.5, outside);
+            let (mut inside, mut outside) = (if i == 0 { 0.0 } else { parts[i - 1] }, parts[i]);
             for _ in 0..60 {
                 let middle = (inside + outside) / 2.0;
                 if piece.is_left(t + middle * h, to(middle)) { outside = middle } else { inside = middle }

@@ -32,6 +32,7 @@ pub(crate) fn by_doubled_steps<'p>(
         h: trials.request.span / count as f64,
         error: Some(error),
         ended: None,
+        end: None,
     };
     let mut count = grid.whole(first_guess(trials.request, DEFAULT_STAGES, wanted) as f64);
     let (mut known, mut before, mut best, mut stagnations): (Option<Track>, _, _, _) =

@@ -24,9 +24,14 @@ impl ComparisonGrid {
         ComparisonGrid::of(steps.min(COMPARED_PARTS))
     }
 
+    /// The number of steps that divides those of all runs.
+    pub fn base(&self) -> usize {
+        if let ComparisonGrid::Steps { base, .. } = self { *base } else { 1 }
+    }
+
     /// The smallest number of steps, not below `steps`, that the grid divides.
     pub fn whole(&self, steps: f64) -> usize {
-        let base = if let ComparisonGrid::Steps { base, .. } = self { *base } else { 1 };
+        let base = self.base();
         (steps / base as f64).ceil().max(1.0) as usize * base
     }
 

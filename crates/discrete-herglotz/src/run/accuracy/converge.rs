@@ -6,11 +6,12 @@ use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::failure::cause_of_disagreement;
 use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{
-    ERROR_ORDER_PER_DEFECT_ORDER, LONG_SEARCH_STEPS, MAX_DEFECT_ORDER, MAX_DISTANCE_OF_AGREEING_RUNS,
-    MAX_DISTANCE_OF_ONE_TIME, MAX_FAILURES_AT_ONE_TIME, MAX_ITERATIONS, MAX_NARROW_RUNS, MAX_PREDICTED_ERROR,
-    MAX_PREDICTIVE_DISTANCE, MAX_STAGNATIONS, MIN_DEFECT_DECREASE, MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT,
-    PREDICTION_RANGE, PREDICTION_REDUCTION, ROUND_OFF_OF_A_STEP,
+    ERROR_ORDER_OF_SMOOTH_MOTIONS, ERROR_ORDER_PER_DEFECT_ORDER, LONG_SEARCH_STEPS, MAX_DEFECT_ORDER,
+    MAX_DISTANCE_OF_AGREEING_RUNS, MAX_DISTANCE_OF_ONE_TIME, MAX_FAILURES_AT_ONE_TIME, MAX_ITERATIONS, MAX_NARROW_RUNS,
+    MAX_NEWTON_RUNS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE, MAX_STAGNATIONS, MIN_DEFECT_ORDER,
+    MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, PREDICTION_RANGE, PREDICTION_REDUCTION, ROUND_OFF_OF_A_STEP,
 };
+use crate::run::accuracy::pair::Pairs;
 use crate::run::accuracy::track::Track;
 use crate::run::accuracy::trial_end::{SwitchReason, TrialEnd};
 use crate::run::accuracy::trial_runs::TrialRuns;
@@ -18,10 +19,12 @@ use crate::run::request::{MAX_STEPS, StepSelection};
 use crate::{InputError, SelectionFailure};
 use contact_geom::numbers::max_or_nan;
 
-/// A motion on which runs with k and 2k steps agree.
+/// A motion on which runs with k and with more steps agree.
 pub(crate) struct Converged {
     pub k: usize,
-    /// The error of the run with k steps, and the predicted error of the run with 2k steps.
+    /// The number of steps of the finer run.
+    pub finer: usize,
+    /// The error of the run with k steps, and the predicted error of the finer run.
     pub errors: [f64; 2],
     /// The error that a change of the last digit of the start causes, if it was measured; otherwise 0.
     pub last_digit: f64,
@@ -29,7 +32,7 @@ pub(crate) struct Converged {
     /// order of the error.
     pub defect: f64,
     pub order: f64,
-    /// Whether the run with 2k steps costs less: its fixed-point iterations converge, where longer steps need Newton's
+    /// Whether the finer run costs less: its fixed-point iterations converge, where longer steps need Newton's
     /// method.
     pub finer_is_cheaper: bool,
     pub reference: Track,
@@ -94,9 +97,10 @@ pub(crate) fn selected<'p>(
             h: found.reference.tau / (count - 0.5),
             error,
             ended: None,
+            end: None,
         };
     }
-    StepSelection { integrator, count, h, error, ended: None }
+    StepSelection { integrator, count, h, error, ended: None, end: None }
 }
 
 /// Refines the steps until two runs agree.
@@ -109,14 +113,21 @@ pub(crate) fn converge(
     let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
     let failed = |reached, cause| InputError::Accuracy { wanted, reached, cause };
     let s = stages as f64;
-    let grid_of = |k: usize| match compared {
-        Compared::Steps => ComparisonGrid::of(k),
+    let smooth = matches!(compared, Compared::Steps) && trials.is_smooth()?;
+    let goal_of_first = Pairs::goal_of_first(smooth, stages, goal);
+    let grid_of = |k: usize, pairs: Pairs| match compared {
+        Compared::Steps => ComparisonGrid::of(pairs.base(k)),
         Compared::Tenths => ComparisonGrid::equal(k),
         Compared::Times => ComparisonGrid::Times,
     };
-    let mut k = first_guess(trials.request, stages, goal);
+    let mut k = first_guess(trials.request, stages, goal_of_first);
     let first = k.max(LONG_SEARCH_STEPS / MIN_RATIO_FOR_DIVISION);
-    let mut grid = grid_of(k);
+    let mut pairs = Pairs::of(smooth, k, stages, goal);
+    let mut grid = grid_of(k, pairs);
+    // The number of steps of the next run, if that before it is known; whether it may be smaller. In general the iteration
+    // does not converge for steps that are longer than the first guess.
+    let mut newton_runs = 0;
+    let (mut next, mut may_be_coarser) = (None, trials.request.iterates_accelerations());
     let (mut best, mut stagnations, mut narrow_features, mut failures) = (f64::INFINITY, 0, 0, (0, 0.0));
     // The smallest distance of two runs, regardless of a third one; and the reason why they do not agree.
     let (mut nearest, mut cause) = (f64::INFINITY, SelectionFailure::Budget);
@@ -130,29 +141,46 @@ pub(crate) fn converge(
             break;
         }
         if known.is_none() {
-            grid = grid_of(k);
-            k = grid.whole(k as f64);
+            pairs = Pairs::of(smooth, k, stages, goal);
+            grid = grid_of(k, pairs);
+            k = pairs.first(&grid).unwrap_or_else(|| grid.whole(k as f64));
         }
         let left = trials.reserve;
         let mut tracks = Vec::with_capacity(2);
-        for (multiple, closely) in [(1, false), (2, true)] {
+        let mut second = 2 * k;
+        for is_second in [false, true] {
             if let Some(track) = known.take() {
+                second = next.take().unwrap_or_else(|| pairs.second(&grid, k, track.defect, may_be_coarser));
                 tracks.push(track);
                 continue;
             }
-            let ending = trials.gauss(stages, multiple * k, &grid, closely, narrow_features < MAX_NARROW_RUNS)?;
+            let count = if is_second { second } else { k };
+            trials.ends_at_newton_steps = smooth && newton_runs < MAX_NEWTON_RUNS;
+            let ending = trials.gauss(stages, count, &grid, is_second, narrow_features < MAX_NARROW_RUNS)?;
             let stopped = match ending {
                 TrialEnd::Completed(track) => {
                     // The error is about the square of the defect: from a defect that is far too large the number of
                     // steps is predicted, instead of doubled repeatedly.
-                    let more = (track.defect.powi(2) / goal).powf(0.5 / s) / PREDICTION_REDUCTION;
-                    if multiple == 1 && !predicted && more > PREDICTION_RANGE[0] {
+                    let more = (track.defect.powi(2) / goal_of_first).powf(0.5 / s) / PREDICTION_REDUCTION;
+                    if !is_second && !predicted && more > PREDICTION_RANGE[0] {
                         predicted = true;
                         k = (k as f64 * more.min(PREDICTION_RANGE[1])).ceil() as usize;
                         continue 'search;
                     }
+                    if !is_second {
+                        second = pairs.second(&grid, k, track.defect, may_be_coarser);
+                    }
                     tracks.push(track);
                     continue;
+                }
+                _ if is_second && second < k && !matches!(ending, TrialEnd::Interrupted) => {
+                    (known, may_be_coarser) = (tracks.pop(), false);
+                    continue 'search;
+                }
+                TrialEnd::SwitchReason(SwitchReason::FewerStages) if !trials.tests_newton_steps => {
+                    newton_runs += 1;
+                    (k, next) = (2 * k, None);
+                    continue 'search;
                 }
                 TrialEnd::SwitchReason(reason) => {
                     return Err(Ended::Switch { reason, otherwise: failed(nearest, SelectionFailure::Budget) });
@@ -187,20 +215,27 @@ pub(crate) fn converge(
             k *= 2;
             continue 'search;
         }
+        let mut finer = second;
+        if finer < k {
+            tracks.reverse();
+            (k, finer) = (finer, k);
+        }
         let [coarse, fine] = tracks.as_slice() else { break };
+        let ratio = finer as f64 / k as f64;
         // Runs that agree in all digits may still have an error of half a unit in the last place.
         let error = max_or_nan(coarse.distance(fine), 0.5 * f64::EPSILON);
         // The defect of a smooth motion decreases with order s; at a jump it does not decrease; if only round-off
         // remains it is negligible.
         let falls = fine.defect
             <= max_or_nan(
-                coarse.defect / MIN_DEFECT_DECREASE,
+                coarse.defect / ratio.powf(MIN_DEFECT_ORDER),
                 max_or_nan(NEGLIGIBLE_DEFECT * wanted, MIN_COMPARED_DEFECT),
             );
-        let fall = (coarse.defect / fine.defect).log2();
+        let fall = (coarse.defect / fine.defect).log2() / ratio.log2();
         let order = if fall.is_nan() { s } else { fall.clamp(0.0, s) };
         // The error of the finer run: it has order 2s, whereas the defect has order s.
-        let beyond = error / 2.0f64.powf(ERROR_ORDER_PER_DEFECT_ORDER * order);
+        let per_order = if smooth { ERROR_ORDER_OF_SMOOTH_MOTIONS } else { ERROR_ORDER_PER_DEFECT_ORDER };
+        let beyond = error / ratio.powf(per_order * order);
         let distances = coarse.distances(fine);
         // Round-off does not decrease with the step size; along the motion it grows like the distance of the runs.
         let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
@@ -217,6 +252,7 @@ pub(crate) fn converge(
             let last_digit = trials.error_of_last_digit([coarse, fine], repeat)?;
             return Ok(Converged {
                 k,
+                finer,
                 errors: [error, beyond],
                 last_digit,
                 defect: coarse.defect,
@@ -259,7 +295,8 @@ pub(crate) fn converge(
             break;
         }
         known = Some(fine.clone());
-        k *= 2;
+        next = Some(if falls { pairs.next(&grid, finer, beyond) } else { 2 * finer });
+        k = finer;
     }
     if let Some((k, coarse, order)) = last {
         let repeat = |trials: &mut TrialRuns<'_, '_>| trials.gauss_without_samples(stages, k, &grid);

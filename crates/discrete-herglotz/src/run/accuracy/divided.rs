@@ -68,6 +68,7 @@ pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSe
                 h,
                 error,
                 ended: None,
+                end: None,
             });
         }
         let distances = first.distances(&second);

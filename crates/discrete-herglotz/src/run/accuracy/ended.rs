@@ -39,8 +39,9 @@ impl<'p> Request<'p> {
             h,
             error: Some(EVENT_SEARCH_ERROR),
             ended: None,
+            end: None,
         };
-        let plan = Plan::new(&request, &selection).ok()?;
+        let plan = Plan::new(&request, selection).ok()?;
         let outcome = integrate(&plan, &mut vec![terminal, Box::new(Budget)], None).ok()?;
         match outcome.status {
             Status::Stopped { by, .. } if by != SPENT => Some(outcome.t),
@@ -60,6 +61,6 @@ impl<'p> StepSelection<'p> {
         } else {
             self.h * (self.count as f64 * factor / count)
         };
-        StepSelection { h, count: count as usize, ended: Some(self.count), ..self }
+        StepSelection { h, count: count as usize, ended: Some(self.count), end: None, ..self }
     }
 }

@@ -68,7 +68,8 @@ impl<'p> TrialRuns<'_, 'p> {
         let mut nearest: Option<(f64, Vec<f64>)> = None;
         for factor in CHANGES {
             let Some(request) = self.request.with_start_times(factor) else { continue };
-            let mut trials = TrialRuns { request: &request, collocation: self.collocation.clone(), ..*self };
+            let mut trials =
+                TrialRuns { request: &request, collocation: self.collocation.clone(), completed: Vec::new(), ..*self };
             let ending = run(&mut trials);
             (self.left, self.reserve) = (trials.left, trials.reserve);
             let distances = match ending {

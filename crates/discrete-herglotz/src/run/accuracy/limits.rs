@@ -84,6 +84,16 @@ pub(crate) const MAX_DISTANCE_OF_AGREEING_RUNS: f64 = 0.25;
 /// need not approximate the same motion.
 pub(crate) const MAX_PREDICTIVE_DISTANCE: f64 = 1e-2;
 
+/// The smallest number of steps from which on runs of a smooth motion with numbers of steps in the ratio 2 : 3 are
+/// compared: fewer steps would be compared at too few times.
+pub(crate) const MIN_STEPS_OF_RATIO: usize = 24;
+
+/// The ratio of the numbers of steps of two runs if the error that is predicted for the coarser one is close to the goal.
+pub(crate) const NEAR_RATIO: [usize; 2] = [4, 3];
+
+/// The largest error that is close to the goal, in units of the distance of runs that agree.
+pub(crate) const MAX_ERROR_OF_NEAR_RUN: f64 = 100.0;
+
 /// The largest predicted error of the finer run, and the largest round-off, in units of the goal, at which both runs
 /// count as agreeing although their distance is larger: a tenth, since predictions may be wrong by this factor.
 pub(crate) const MAX_PREDICTED_ERROR: f64 = 0.1;
@@ -92,9 +102,9 @@ pub(crate) const MAX_PREDICTED_ERROR: f64 = 0.1;
 /// square root of the number of steps.
 pub(crate) const ROUND_OFF_OF_A_STEP: f64 = 2e-15;
 
-/// The factor by which the defect must decrease from k to 2k steps: that of order three, below the order of every
-/// collocation method that is its own reference. At a jump the defect does not decrease.
-pub(crate) const MIN_DEFECT_DECREASE: f64 = 8.0;
+/// The order with which the defect must at least decrease from one run to the next, below the order of every collocation
+/// method that is its own reference. At a jump the defect does not decrease.
+pub(crate) const MIN_DEFECT_ORDER: f64 = 3.0;
 
 /// A defect below this, in units of the requested error, need not decrease.
 pub(crate) const NEGLIGIBLE_DEFECT: f64 = 0.01;
@@ -105,6 +115,9 @@ pub(crate) const NEGLIGIBLE_SAMPLED_DEFECT: f64 = 0.1;
 /// The order of the error in units of the observed order of the defect, for the prediction of the error of the finer
 /// run. In theory it is two.
 pub(crate) const ERROR_ORDER_PER_DEFECT_ORDER: f64 = 1.5;
+
+/// The same for motions that are known to be smooth: that of the theory.
+pub(crate) const ERROR_ORDER_OF_SMOOTH_MOTIONS: f64 = 2.0;
 
 /// The decrease of the defect, in units of the order, above which it is not due to the order: the finer steps end at a
 /// kink.
@@ -137,6 +150,10 @@ pub(crate) const MIN_TRANSFORMATION_GAIN: f64 = 3.5;
 /// The number of steps that may need Newton's method before other stages are tried, in addition to
 /// [`MAX_NEWTON_FRACTION`].
 pub(crate) const MAX_NEWTON_STEPS: f64 = 2.0;
+
+/// The number of runs of a search that end where many steps need Newton's method: a run with twice as many steps usually
+/// costs less, but not where short steps need it too.
+pub(crate) const MAX_NEWTON_RUNS: usize = 2;
 
 /// The fraction of all steps that may need Newton's method before other stages are tried. If a coarse run stays below
 /// both bounds, a run with twice as many steps rarely needs Newton's method.

@@ -14,6 +14,7 @@ pub(crate) mod first_guess;
 mod last_digit;
 pub(crate) mod limits;
 mod matrices;
+mod pair;
 mod reference;
 mod rest;
 mod select;

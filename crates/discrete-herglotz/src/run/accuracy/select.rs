@@ -1,7 +1,7 @@
 //! The selection of the integrator and of the number of steps for a requested error.
 
 use crate::gauss::MAX_STAGES;
-use crate::integration::{SharedIntegrator, is_separable};
+use crate::integration::SharedIntegrator;
 use crate::run::accuracy::by_doubled_steps::by_doubled_steps;
 use crate::run::accuracy::converge::{Compared, Converged, Ended, converge, selected};
 use crate::run::accuracy::divided::divided_steps;
@@ -23,8 +23,7 @@ use contact_geom::numbers::max_or_nan;
 /// The number of stages of Gauss collocation if no integrator is given: for few steps the tables of many stages are
 /// expensive, for many steps of few stages the number of steps.
 fn stages_along(request: &Request<'_>, wanted: f64) -> usize {
-    let structure = &request.problem.structure;
-    let condensed = is_separable(&*request.problem.system, structure) && structure.has_constant_rate();
+    let condensed = request.iterates_accelerations();
     // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
     if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MIN_STEPS_FOR_MAX_STAGES {
         MAX_STAGES
@@ -63,7 +62,7 @@ pub(crate) fn select_steps<'p>(
     };
     // The motion after this end is not computed.
     let span = t_end - request.problem.t0;
-    let part = Request { t_end, span, ..request.clone() };
+    let part = Request { t_end, span, ends_only: false, ..request.clone() };
     Ok(select(&part)?.extended_by(request.span / span))
 }
 
@@ -170,10 +169,11 @@ fn by_equal_steps<'p>(
     let found = converge(trials, stages, wanted, Compared::Steps)?;
     // If the mass matrix or the drag varies along the motion, a longer step may leave the domain of L, which the defect
     // does not predict.
-    let structure = &trials.request.problem.structure;
-    let longer = is_separable(&*trials.request.problem.system, structure) && structure.has_constant_rate();
-    let (count, error) = min_step_count(stages, wanted, &found, longer);
-    Ok(selected(trials, integrator, count, error, &found))
+    let longer = trials.request.iterates_accelerations();
+    let reusable = trials.request.may_be_a_trial_run();
+    let (count, error) = min_step_count(stages, wanted, &found, longer, reusable);
+    let end = trials.take_completed(stages, count);
+    Ok(StepSelection { end, ..selected(trials, integrator, count, error, &found) })
 }
 
 /// The same selection with steps of equal size in the transformed time of the Lagrangian.
@@ -184,22 +184,27 @@ fn in_transformed_time<'p>(
 ) -> Result<StepSelection<'p>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Times)?;
-    let (count, error) = min_step_count(stages, wanted, &found, false);
+    let (count, error) = min_step_count(stages, wanted, &found, false, false);
     Ok(selected(trials, integrator, count, error, &found))
 }
 
-/// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict.
-fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool) -> (usize, f64) {
-    let Converged { k, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, .. } = *found;
+/// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict; that of
+/// one of these runs, if it may be the run itself.
+fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool, reusable: bool) -> (usize, f64) {
+    let Converged { k, finer, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, .. } = *found;
     let (target, predicted) = (TARGET_ERROR * wanted, PREDICTED_ERROR * wanted);
     let steps =
         |order: f64| (k as f64 * (max_or_nan(error, MIN_PREDICTIVE_ERROR) / predicted).powf(1.0 / order)).ceil();
     // Steps that end at a kink by chance agree, while other steps do not.
     if irregular || order < stages as f64 / MAX_STAGES_PER_ORDER {
-        return if error <= target { (k, error) } else { (2 * k, beyond) };
+        return if error <= target { (k, error) } else { (finer, beyond) };
+    }
+    // A run that is known costs nothing.
+    if reusable {
+        return if error <= target { (k, error) } else { (finer, beyond) };
     }
     if finer_is_cheaper {
-        return (2 * k, beyond);
+        return (finer, beyond);
     }
     if error <= target {
         // Longer steps are taken only if the predicted defect shows that they still resolve the motion.
@@ -213,5 +218,5 @@ fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool) -
     }
     // The error of shorter steps decreases like the square of the defect.
     let more = steps(2.0 * order);
-    if more < 2.0 * k as f64 { (more as usize, max_or_nan(predicted, beyond)) } else { (2 * k, beyond) }
+    if more < finer as f64 { (more as usize, max_or_nan(predicted, beyond)) } else { (finer, beyond) }
 }

@@ -31,6 +31,7 @@ fn search<L: Lagrangian<N>, const N: usize>(
         needs: OutputRequest::default(),
         scales: None,
         parts: None,
+        ends_only: false,
     };
     let mut trials = TrialRuns::new(&request, wanted, collocation);
     let selection = select_within_budget(&mut trials).unwrap();

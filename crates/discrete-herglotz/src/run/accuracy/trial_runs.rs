@@ -38,10 +38,20 @@ pub(crate) struct TrialRuns<'t, 'p> {
     pub wanted: f64,
     /// Whether runs with equal steps end if a time transformation would take far fewer.
     pub tests_transformation: bool,
-    /// Whether runs end if many of their steps need Newton's method.
+    /// Whether runs end if many of their steps need Newton's method, and whether this run does.
     pub tests_newton_steps: bool,
+    pub ends_at_newton_steps: bool,
     /// Whether a search ends if it requires many times more steps than the start of the motion.
     pub tests_uneven_steps: bool,
+    /// The steppers of the last two completed runs of Gauss collocation, with their numbers of stages and of steps.
+    pub completed: Vec<CompletedRun<'p>>,
+}
+
+/// A trial run that has reached the end of the span.
+pub(crate) struct CompletedRun<'p> {
+    stages: usize,
+    count: usize,
+    stepper: Box<dyn Stepper + 'p>,
 }
 
 impl<'t, 'p> TrialRuns<'t, 'p> {
@@ -56,8 +66,26 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             wanted,
             tests_transformation,
             tests_newton_steps,
+            ends_at_newton_steps: false,
             tests_uneven_steps,
+            completed: Vec::new(),
         }
+    }
+
+    /// The stepper at the end of the run with these stages and this number of steps, if it was one of the last two.
+    pub fn take_completed(&mut self, stages: usize, count: usize) -> Option<Box<dyn Stepper + 'p>> {
+        let found = self.completed.iter().position(|run| run.stages == stages && run.count == count)?;
+        Some(self.completed.swap_remove(found).stepper)
+    }
+
+    /// Whether the system is known to be smooth: all of its kinks and jumps are zeros of switching functions or points of
+    /// cones, and it has neither.
+    pub fn is_smooth(&self) -> Result<bool, InputError> {
+        let SystemProblem { system, t0, start, .. } = &self.request.problem;
+        let hints = system.hints();
+        Ok(hints.proved
+            && !system.has_cones()
+            && !(hints.switching_functions && has_switching_functions(&**system, *t0, start)?))
     }
 
     /// Computes the motion by contact Gauss collocation, with a defect sample between the nodes of each step: with
@@ -72,7 +100,13 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         narrow: bool,
     ) -> Result<TrialEnd, InputError> {
         let (problem, h) = (&self.request.problem, self.step(count, grid));
-        let points = if closely { MIN_SAMPLE_POINTS.div_ceil(stages * count).min(SAMPLE_SETS) } else { 1 };
+        let nodes = stages * count;
+        let points = match closely {
+            // The nodes of a smooth motion are points at which a narrow feature would be met.
+            true if self.is_smooth()? => MIN_SAMPLE_POINTS.saturating_sub(nodes).div_ceil(nodes).clamp(1, SAMPLE_SETS),
+            true => MIN_SAMPLE_POINTS.div_ceil(nodes).min(SAMPLE_SETS),
+            false => 1,
+        };
         let costs = EvaluationCost::of(stages, problem.system.dimension());
         let settings = TrialSettings { count, grid, points, narrow, costs };
         let hints = problem.system.hints();
@@ -84,7 +118,9 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             let ending = self.run_with_samples(&mut *stepper, &settings, 1)?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        let (options, collocation) = (StepperOptions::default(), self.collocation.clone());
+        // The run itself may be one of these, and computes what is requested of it.
+        let action = self.request.may_be_a_trial_run() && self.request.needs.action;
+        let (options, collocation) = (StepperOptions { action, ..StepperOptions::default() }, self.collocation.clone());
         if hints.switching_functions && has_switching_functions(&*problem.system, problem.t0, &problem.start)? {
             let make = move |problem: &SystemProblem<'p>, h: f64, _: bool| {
                 collocation.stepper(problem, stages, h, options).map(PartStepper::Collocation)
@@ -100,9 +136,26 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             Err(error) => return TrialEnd::of_failed_start(error),
         };
         // For a linear motion the defect between the nodes contains no more than the order does.
-        let (stride, points) = if stepper.is_linear() { (MAX_UNCHECKED_STEPS, 0) } else { (1, settings.points) };
+        let (stride, points) = match stepper.is_linear() {
+            true => (MAX_UNCHECKED_STEPS, 0),
+            false => (self.sampled_stride(stages, count, grid)?, settings.points),
+        };
         let settings = TrialSettings { points, ..settings };
-        self.run_with_samples(&mut *stepper, &settings, stride)
+        let ending = self.run_with_samples(&mut *stepper, &settings, stride)?;
+        if let TrialEnd::Completed(_) = ending
+            && self.request.may_be_a_trial_run()
+        {
+            self.completed.truncate(1);
+            self.completed.insert(0, CompletedRun { stages, count, stepper });
+        }
+        Ok(ending)
+    }
+
+    /// The number of steps of which one is sampled. In a smooth motion whose nodes alone lie densely, the samples only show
+    /// how fast the defect falls: they are taken at the same times in all runs.
+    fn sampled_stride(&self, stages: usize, count: usize, grid: &ComparisonGrid) -> Result<usize, InputError> {
+        let all = self.tests_transformation || !self.is_smooth()?;
+        Ok(if all || stages * count < MIN_SAMPLE_POINTS { 1 } else { (count / grid.base()).max(1) })
     }
 
     /// The motion of [`gauss`](Self::gauss), without defect samples: near an equilibrium they see its round-off.
@@ -158,7 +211,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             max_or_nan(NEGLIGIBLE_SAMPLED_DEFECT * self.wanted, MIN_COMPARED_DEFECT),
             (self.request.span / *count as f64).abs(),
         );
-        let Self { tests_transformation, tests_newton_steps, .. } = *self;
+        let Self { tests_transformation, tests_newton_steps, ends_at_newton_steps, .. } = *self;
+        let tests_newton_steps = tests_newton_steps || ends_at_newton_steps;
         let (mut samples, mut cost) = (0, 0);
         let (mut history, mut gain) = (DefectHistory::default(), TransformationGain::default());
         let ending = self.take_steps(run, *count, grid, stride, |run, part| {
@@ -174,6 +228,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             }
             let ending = sample.and_then(|sample| {
                 samples += *points as u64 + 1;
+                // Values of L at the ends of steps between which others lie are not compared.
+                let sample = if stride > 1 { sample.after_a_jump() } else { sample };
                 if !history.resolves(&sample) {
                     return Some(TrialEnd::Unresolved { part });
                 }
@@ -211,6 +267,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             h: self.step(count, grid),
             error: None,
             ended: None,
+            end: None,
         };
         let stepper = Discretization::new(&self.request.bare(), &selection).and_then(|steps| steps.stepper(false));
         let mut stepper = match stepper {
@@ -251,7 +308,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             }
             chunks += 1;
             // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation.
-            let chunk = stride.min(taken.max(1)).min(steps - taken);
+            let chunk = if stride == MAX_UNCHECKED_STEPS { stride.min(taken.max(1)) } else { stride };
+            let chunk = chunk.min(steps - taken);
             let advanced = match run.run_support_mut() {
                 Some(run) => run.advance_until(chunk, time),
                 None => run.advance(chunk).map(|()| chunk),

@@ -28,6 +28,12 @@ pub trait Observer {
         taken + 1
     }
 
+    /// Whether it sees the motion at the start and at the end of the run alone, and nothing between is lost where the run
+    /// takes its steps without it: by default not. A run for an accuracy may then be one of its trial runs.
+    fn sees_only_the_ends(&self) -> bool {
+        false
+    }
+
     /// Called at the start, before the first step.
     fn start(&mut self, _at: &StepView<'_>) -> ControlFlow<Stop> {
         ControlFlow::Continue(())
@@ -74,6 +80,9 @@ macro_rules! one_after_the_other {
             fn next(&self, taken: usize) -> usize {
                 usize::MAX$(.min(self.$field.next(taken)))+
             }
+            fn sees_only_the_ends(&self) -> bool {
+                [$(self.$field.sees_only_the_ends()),+].iter().all(|ends| *ends)
+            }
             fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
                 $(self.$field.start(at)?;)+
                 ControlFlow::Continue(())
@@ -105,6 +114,9 @@ impl<O: Observer> Observer for Vec<O> {
     fn next(&self, taken: usize) -> usize {
         self.iter().map(|observer| observer.next(taken)).min().unwrap_or(usize::MAX)
     }
+    fn sees_only_the_ends(&self) -> bool {
+        self.iter().all(Observer::sees_only_the_ends)
+    }
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.iter_mut().try_for_each(|observer| observer.start(at))
     }
@@ -132,6 +144,9 @@ impl<O: Observer> Observer for Borrowed<'_, O> {
     fn next(&self, taken: usize) -> usize {
         self.0.next(taken)
     }
+    fn sees_only_the_ends(&self) -> bool {
+        self.0.sees_only_the_ends()
+    }
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         self.0.start(at)
     }
@@ -155,6 +170,9 @@ impl Observer for Box<dyn Observer + '_> {
     }
     fn next(&self, taken: usize) -> usize {
         (**self).next(taken)
+    }
+    fn sees_only_the_ends(&self) -> bool {
+        (**self).sees_only_the_ends()
     }
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         (**self).start(at)

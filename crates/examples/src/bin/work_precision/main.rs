@@ -1,7 +1,7 @@
 //! Work-precision measurements: run time against error, for the library's methods and for other ODE solvers.
 //!
 //! ```text
-//! cargo run --release --bin work_precision [-- --problem NAME --method NAME --z on|off --out DIR] [--peers FILE] [--quick]
+//! cargo run --release --bin work_precision [-- --problem NAME --method NAME --z on|off --out DIR] [--peers FILE] [--quick] [--calls]
 //! ```
 //!
 //! Problems with known final states are solved with decreasing steps or tolerances, with the action and without. P1, P2,
@@ -12,10 +12,13 @@
 //! Two implementations of dop853 are measured in the same run; rows of peers that are not in Rust are read from the
 //! file of `--peers`, which must have been measured on the same machine.
 //!
+//! With `--calls`, whole calls are timed instead: for a requested error, and with given steps that reach it.
+//!
 //! Writes `work_precision.csv` and a diagram of each problem into `--out`, and prints the times to reach three errors.
 //! Runs without a final state are counted on stderr. The exit code is 2 if a name is unknown, the file of the peers is
 //! invalid, or the output cannot be written.
 
+mod calls;
 mod candidate;
 mod diagrams;
 mod library;
@@ -61,6 +64,9 @@ struct Arguments {
     /// Measures a third of the steps, and ends each sweep at a shorter run time.
     #[arg(long)]
     quick: bool,
+    /// Measures whole calls for a requested error instead, beside calls with given steps; writes `calls.csv`.
+    #[arg(long, conflicts_with_all = ["peers", "quick", "method"])]
+    calls: bool,
 }
 
 /// A candidate, with the problem that it solves and its origin.
@@ -86,6 +92,10 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         let with = arguments.z.is_none_or(|requested| requested == z);
         with && is_requested(&arguments.problem, problem.name)
     };
+    if arguments.calls {
+        let problems = variants().filter(|(problem, z)| is_measured(problem, *z));
+        return calls::run(problems, &Directory::create(&arguments.out)?);
+    }
 
     let mut rows = match &arguments.peers {
         Some(path) => recorded::read(path, if arguments.all_peers { Peers::All } else { Peers::Heyoka })?,

@@ -72,7 +72,7 @@ fn controls(control: Control, problem: &Problem, effort: Effort) -> Vec<f64> {
 }
 
 /// Solves the problem often enough for a median of the run time; all other results are the same in every run.
-fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
+pub fn timed(candidate: &dyn Candidate, control: f64) -> Result<Run, RunError> {
     let mut run = candidate.run(control)?;
     let mut seconds = vec![run.seconds];
     let mut total = run.seconds;

@@ -1,0 +1,83 @@
+//! The numbers of steps of two trial runs of a smooth motion whose distance gives the error of the coarser one.
+//!
+//! With order 2s a step that is longer by a half has an error that is larger by a factor of a thousand or more: then two runs
+//! with numbers of steps in the ratio 2 : 3 tell as much as runs with k and 2k steps, and the finer one, whose error is
+//! predicted from their distance, is the run itself or close to it.
+
+use crate::run::accuracy::comparison_grid::ComparisonGrid;
+use crate::run::accuracy::limits::{
+    ERROR_ORDER_PER_DEFECT_ORDER, MAX_DISTANCE_OF_AGREEING_RUNS, MAX_ERROR_OF_NEAR_RUN, MAX_PREDICTED_ERROR,
+    MAX_PREDICTIVE_DISTANCE, MIN_STEPS_OF_RATIO, NEAR_RATIO,
+};
+
+/// The number of steps of the first run, as a multiple of the base of the comparison grid; the runs beside it have
+/// [`COARSER`] and [`FINER`] times the base.
+const FIRST: usize = 6;
+const COARSER: usize = 4;
+const FINER: usize = 9;
+
+/// The ratio of their numbers of steps.
+const RATIO: f64 = 1.5;
+
+/// How the numbers of steps of a search follow each other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pairs {
+    /// Whether runs in the ratio 2 : 3 are compared; otherwise those with k and 2k steps.
+    close: bool,
+    s: f64,
+    goal: f64,
+}
+
+impl Pairs {
+    /// The pairs of a motion, by a method of s stages, for an error. The search starts with k steps.
+    pub fn of(smooth: bool, k: usize, stages: usize, goal: f64) -> Self {
+        Pairs { close: smooth && k >= MIN_STEPS_OF_RATIO, s: stages as f64, goal }
+    }
+
+    /// The error of the first run from which that of the finer one is predicted to be small enough.
+    pub fn goal_of_first(smooth: bool, stages: usize, goal: f64) -> f64 {
+        if !smooth {
+            return goal;
+        }
+        let gain = RATIO.powf(ERROR_ORDER_PER_DEFECT_ORDER * stages as f64);
+        (MAX_PREDICTED_ERROR * goal * gain).min(0.1 * MAX_PREDICTIVE_DISTANCE).max(goal)
+    }
+
+    /// The base of the grid on which a first run with about k steps is compared.
+    pub fn base(&self, k: usize) -> usize {
+        if self.close { k.div_ceil(FIRST) } else { k }
+    }
+
+    /// The number of steps of the first run, if the grid determines it.
+    pub fn first(&self, grid: &ComparisonGrid) -> Option<usize> {
+        self.close.then(|| FIRST * grid.base())
+    }
+
+    /// The number of steps of the second run, with a defect of the first: fewer steps if that is too accurate already.
+    pub fn second(&self, grid: &ComparisonGrid, k: usize, defect: f64, may_be_coarser: bool) -> usize {
+        if !self.close {
+            return 2 * k;
+        }
+        // The error is about the square of the defect.
+        let of_coarser = defect.powi(2) * RATIO.powf(2.0 * self.s);
+        let of_first = of_coarser / RATIO.powf(ERROR_ORDER_PER_DEFECT_ORDER * self.s);
+        // Both must be such that the runs agree.
+        let coarser = of_coarser <= MAX_PREDICTIVE_DISTANCE && of_first <= 0.1 * MAX_PREDICTED_ERROR * self.goal;
+        if coarser && may_be_coarser { COARSER * grid.base() } else { FINER * grid.base() }
+    }
+
+    /// The number of steps after two runs with k and fewer steps that do not agree; the error of the finer one is
+    /// predicted to be `beyond`.
+    pub fn next(&self, grid: &ComparisonGrid, k: usize, beyond: f64) -> usize {
+        if self.close && k == FIRST * grid.base() {
+            return FINER * grid.base();
+        }
+        let near = beyond <= MAX_ERROR_OF_NEAR_RUN * MAX_DISTANCE_OF_AGREEING_RUNS * self.goal;
+        let [numerator, denominator] = NEAR_RATIO;
+        if self.close && near && (numerator * k).is_multiple_of(denominator * grid.base()) {
+            numerator * k / denominator
+        } else {
+            2 * k
+        }
+    }
+}
