@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
 
-use herglotz_runtime::{Interrupt, Motion, Outcome, Start, Status, StepControl, Steps, System};
+use herglotz_runtime::{
+    Formula, FormulaNames, InitialVelocity, Interrupt, Motion, Outcome, OutputTimes, Start, Status, StepControl, Steps,
+    System,
+};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -70,4 +73,41 @@ fn a_motion_through_a_tip_is_planned_soon() {
     // It is asked every 16 steps of a trial run.
     let steps = 16 * asked.load(Ordering::Relaxed);
     assert!(steps <= 1 << 14, "{steps} steps");
+}
+
+/// A run of which only the end is seen may be one of its trial runs; with rows its steps are taken once more. Both are the
+/// same motion to the last bit, within its accuracy of the motion for 1e-12.
+#[test]
+fn what_is_observed_does_not_change_the_motion() {
+    let pendulums = "x'^2 + y'^2/2 + cos(x - y)*x'*y' - 2*(1 - cos(x)) - (1 - cos(y)) - 0.1*z";
+    let hamiltonian = Formula::parse_hamiltonian("p_x^2/2 + x^4/4 + 0.05*z", &FormulaNames::new(&["x"], &[])).unwrap();
+    let of = |l: &str, coordinates: &[&str]| System::parse(l, coordinates, &[]).unwrap();
+    let of_hamiltonian = Start { velocity: InitialVelocity::Momentum(vec![0.5]), ..Start::new(0.0, [1.0], [0.5], 0.0) };
+    let cases = [
+        (of("x'^2/2 + cos(x) - 0.01*z", &["x"]), Start::new(0.0, [1.0], [1.0], 0.0), 200.0),
+        (of("x'^2/2 - x^2/2 - 0.05*z^2", &["x"]), Start::new(0.0, [1.0], [0.0], 1.0), 60.0),
+        (of("x'^2/2 - x^2/2 - 0.1*z", &["x"]), Start::new(0.0, [1.0], [0.0], 1.0), 40.0),
+        (of("(x'^2 + y'^2)/2 + 1/sqrt(x^2 + y^2)", &["x", "y"]), Start::new(0.0, [0.8, 0.0], [0.0, 1.2], 0.0), 60.0),
+        (of(pendulums, &["x", "y"]), Start::new(0.0, [0.9, 0.5], [0.0, 0.0], 0.0), 15.0),
+        (of("x'^2/2 - x^2/2 + 0.3*x*cos(1.7*t)", &["x"]), Start::new(0.0, [1.0], [0.0], 0.0), 2.0),
+        (System::new(&hamiltonian).unwrap(), of_hamiltonian, 40.0),
+    ];
+    for (system, start, t_end) in cases {
+        let motion = |error: f64| Motion::new(start.clone(), t_end, accurate(error));
+        let exact = system.run(&motion(1e-12), &mut ()).unwrap();
+        for error in [1e-3, 1e-6, 1e-9, 1e-11] {
+            let end = system.run(&motion(error), &mut ()).unwrap();
+            let observed = Motion { nodes: true, rows: Some(OutputTimes::Every(1)), ..motion(error) };
+            let with_rows = system.run(&observed, &mut ()).unwrap();
+            let numbers = |of: &Outcome| {
+                let all = of.q.iter().chain(&of.p).chain(&of.z).map(|x| x.to_bits()).collect::<Vec<u64>>();
+                (all, of.steps, of.evaluations, of.status, of.unresolved)
+            };
+            assert_eq!(numbers(&end), numbers(&with_rows), "{start:?}, {error:e}");
+            let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            let size = exact.q.iter().chain(&exact.p).map(|x| x.powi(2)).sum::<f64>();
+            let found = ((apart(&end.q, &exact.q) + apart(&end.p, &exact.p)) / size).sqrt();
+            assert!(found <= error, "{start:?}, {error:e}: {found:e}");
+        }
+    }
 }

@@ -35,6 +35,8 @@ pub(crate) struct Converged {
     /// Whether the finer run costs less: its fixed-point iterations converge, where longer steps need Newton's
     /// method.
     pub finer_is_cheaper: bool,
+    /// Whether the numbers of steps of the two runs are in a ratio of less than 2.
+    pub close: bool,
     pub reference: Track,
     pub grid: ComparisonGrid,
     /// Whether the search found a narrow feature, or defects that do not decrease like those of a smooth motion: the
@@ -258,6 +260,7 @@ pub(crate) fn converge(
                 defect: coarse.defect,
                 order,
                 finer_is_cheaper: fine.cost < coarse.cost,
+                close: pairs.close,
                 reference: fine.clone(),
                 grid,
                 irregular: irregular || narrow_features > 0 || fall > MAX_DEFECT_ORDER * s,

@@ -23,7 +23,7 @@ const RATIO: f64 = 1.5;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pairs {
     /// Whether runs in the ratio 2 : 3 are compared; otherwise those with k and 2k steps.
-    close: bool,
+    pub close: bool,
     s: f64,
     goal: f64,
 }

@@ -170,8 +170,7 @@ fn by_equal_steps<'p>(
     // If the mass matrix or the drag varies along the motion, a longer step may leave the domain of L, which the defect
     // does not predict.
     let longer = trials.request.iterates_accelerations();
-    let reusable = trials.request.may_be_a_trial_run();
-    let (count, error) = min_step_count(stages, wanted, &found, longer, reusable);
+    let (count, error) = min_step_count(stages, wanted, &found, longer);
     let end = trials.take_completed(stages, count);
     Ok(StepSelection { end, ..selected(trials, integrator, count, error, &found) })
 }
@@ -184,14 +183,14 @@ fn in_transformed_time<'p>(
 ) -> Result<StepSelection<'p>, Ended> {
     let wanted = trials.wanted;
     let found = converge(trials, stages, wanted, Compared::Times)?;
-    let (count, error) = min_step_count(stages, wanted, &found, false, false);
+    let (count, error) = min_step_count(stages, wanted, &found, false);
     Ok(selected(trials, integrator, count, error, &found))
 }
 
 /// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict; that of
-/// one of these runs, if it may be the run itself.
-fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool, reusable: bool) -> (usize, f64) {
-    let Converged { k, finer, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, .. } = *found;
+/// one of these runs, if they differ by little.
+fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool) -> (usize, f64) {
+    let Converged { k, finer, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, close, .. } = *found;
     let (target, predicted) = (TARGET_ERROR * wanted, PREDICTED_ERROR * wanted);
     let steps =
         |order: f64| (k as f64 * (max_or_nan(error, MIN_PREDICTIVE_ERROR) / predicted).powf(1.0 / order)).ceil();
@@ -199,8 +198,8 @@ fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool, r
     if irregular || order < stages as f64 / MAX_STAGES_PER_ORDER {
         return if error <= target { (k, error) } else { (finer, beyond) };
     }
-    // A run that is known costs nothing.
-    if reusable {
+    // One of these runs may be the run, and is then known. It is taken whatever is observed, which does not change a motion.
+    if close {
         return if error <= target { (k, error) } else { (finer, beyond) };
     }
     if finer_is_cheaper {
