@@ -1,13 +1,14 @@
 """Motions from Python compared with heyoka: warm and cold run times, call overhead, import time, size of the wheel.
 
-    python benchmarks/against_heyoka.py [WHEEL]
+    python benchmarks/against_heyoka.py [--short] [WHEEL]
 
-Needs heyoka in addition to herglotz. The motions are (T is the final time, z is integrated along):
+Needs heyoka in addition to herglotz; with `--short`, all of the package's own part runs once, with heyoka or without. The motions are (T is the final time, z is integrated along):
 
     P2   v^2/2 - 1 + cos q - 0.01 z      q = 1, v = 1   T = 1000
     P6   v^2/2 - q^2/2 - 0.05 z^2        q = 1, v = 0, z = 1   T = 100
 
-Cold is the time from the definition to the end of the first run: once with a requested accuracy, for which trial runs
+A call by an accuracy is `herglotz.solve` as users type it, search for the steps included, beside the fastest run of
+heyoka with this error and the same steps given. Cold is the time from the definition to the end of the first run: once with a requested accuracy, for which trial runs
 find the step, and once with given steps that reach it. Warm is the fastest way to an error of (q, v) at the end,
 relative to its size there; both libraries run a list of settings. The reference is a run of heyoka with its smallest
 tolerance.
@@ -31,6 +32,17 @@ PROBLEMS = {
 }
 
 
+SHORT = "--short" in sys.argv
+
+
+def has_heyoka():
+    try:
+        import heyoka  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
 def lagrangian(name):
     return {
         "P2": lambda t, q, v, z: v @ v / 2 - 1 + np.cos(q[0]) - 0.01 * z,
@@ -45,7 +57,7 @@ def equations(name, hy):
     return [(q, v), (v, -q - 0.1 * z * v), (z, v * v / 2.0 - q * q / 2.0 - 0.05 * z * z)]
 
 
-def median(run, least=0.3):
+def median(run, least=0.0 if SHORT else 0.3):
     times, run_until = [], time.perf_counter() + least
     while time.perf_counter() < run_until or len(times) < 7:
         begin = time.perf_counter()
@@ -123,6 +135,29 @@ def warm():
             )
 
 
+def calls():
+    import herglotz as hz
+
+    for name, problem in PROBLEMS.items():
+        q, v, z = problem["start"]
+        system = hz.system(lagrangian(name), n=1)
+        other = has_heyoka()
+        if other:
+            reference = of_heyoka(name, 1e-28 if name == "P2" else 1e-18)()
+            theirs = [(f"tol={tol:.0e}", of_heyoka(name, tol)) for tol in 10.0 ** -np.arange(3, 19)]
+        for level in (1e-9,) if SHORT else (1e-3, 1e-6, 1e-9, 1e-12):
+            call = lambda: hz.solve(system, q, v, problem["end"], z0=z, accuracy=level)
+            sol = call()
+            given = of_herglotz(name, sol.plan.integrator, sol.plan.steps)
+            text = f"{name} by accuracy={level:.0e}: {median(call) * 1e6:.0f} us, its {sol.plan.steps} steps given {median(given) * 1e6:.0f} us"
+            if other:
+                found = np.array([sol.q[-1, 0], sol.v[-1, 0]])
+                error = np.linalg.norm(found - reference) / np.linalg.norm(reference)
+                their = cheapest(theirs, reference, level)
+                text += f", error {error:.0e}; heyoka {their[0] * 1e6:.0f} us ({their[1]})"
+            print(text)
+
+
 COLD_HEYOKA = """
 import sys, time, numpy as np, heyoka as hy
 sys.path.insert(0, {folder!r})
@@ -152,7 +187,7 @@ print(time.perf_counter() - middle)
 """
 
 
-def in_a_process(code, count=5):
+def in_a_process(code, count=1 if SHORT else 5):
     """The median of the numbers that a program prints, each in a process of its own."""
     found = [
         float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
@@ -164,7 +199,7 @@ def in_a_process(code, count=5):
 def cold():
     folder = os.path.dirname(os.path.abspath(__file__))
     for name in PROBLEMS:
-        their = in_a_process(COLD_HEYOKA.format(folder=folder, name=name))
+        their = in_a_process(COLD_HEYOKA.format(folder=folder, name=name)) if has_heyoka() else float("nan")
         for way in (dict(accuracy=1e-9), PROBLEMS[name]["steps"]):
             our = in_a_process(COLD_HERGLOTZ.format(folder=folder, name=name, way=way))
             by = ", ".join(f"{key}={value}" for key, value in way.items())
@@ -180,7 +215,7 @@ def overhead():
     from herglotz import _core
 
     system = hz.system(lagrangian("P2"), n=1)
-    request = ([1.0], [1.0], False, 0.0, None), 0.1, None, (None, "strang", None, 1), [], [], False
+    request = ([1.0], [1.0], False, 0.0, None), 0.1, None, (None, "strang", None, 1), [], [], False, False, None
     motion = _core.Motion(system, *request)
     run = median(lambda: [_core.run(motion) for _ in range(100)]) / 100
     for what, L in (("a system", system), ("a function", lagrangian("P2"))):
@@ -192,12 +227,15 @@ def overhead():
 
 
 def main():
-    warm()
+    if has_heyoka() and not SHORT:
+        warm()
+    calls()
     cold()
     overhead()
     print(f"import after numpy: {in_a_process(IMPORT) * 1e3:.1f} ms, of at most 50")
-    if len(sys.argv) > 1:
-        print(f"wheel: {os.path.getsize(sys.argv[1]) / 1e6:.1f} MB, of at most 12")
+    for wheel in sys.argv[1:]:
+        if wheel != "--short":
+            print(f"wheel: {os.path.getsize(wheel) / 1e6:.1f} MB, of at most 12")
 
 
 if __name__ == "__main__":

@@ -219,6 +219,10 @@ impl<'p, L: Lagrangian<N>, const N: usize> Run<'p, '_, Problem<'p, L, N>> {
     /// the motion. The trial runs cost a small multiple of the run. Features of the motion that are narrower than the
     /// distance of their nodes, about the step divided by four times the number of stages, may be missed.
     ///
+    /// Of a system that is known to be smooth, as a formula without kinks, two runs with numbers of steps in the ratio 2 : 3
+    /// suffice in most cases. The run is one of them, and is not computed again where only its end is
+    /// [observed](Observer::sees_only_the_ends).
+    ///
     /// If an observer's event ends the run, the trial runs end there too.
     ///
     /// If no integrator is given, contact Gauss collocation is used: with 8 stages; with 16 stages for many steps whose

@@ -245,6 +245,10 @@ pub(crate) fn converge(
         let allowed = MAX_PREDICTED_ERROR * goal;
         let agreed = error <= MAX_DISTANCE_OF_AGREEING_RUNS * goal
             || (error <= MAX_PREDICTIVE_DISTANCE && beyond <= allowed && round_off <= allowed);
+        if falls && agreed && trials.samples_few_steps(stages * finer)? && !trials.keeps_energy(fine, &grid, finer) {
+            (trials.samples_all_steps, next) = (true, None);
+            continue;
+        }
         let mut disagreement = None;
         if falls && agreed {
             disagreement = disagreement_of_other_nodes(trials, stages, k, compared, goal, fine)?;

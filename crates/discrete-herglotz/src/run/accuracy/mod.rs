@@ -6,6 +6,7 @@ mod converge;
 mod defect_history;
 mod divided;
 mod ended;
+mod energy_law;
 pub(crate) mod equilibrium_round_off;
 mod estimate;
 mod evaluation_cost;

@@ -81,3 +81,40 @@ impl Pairs {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever the number of steps that a search starts with, the runs of a pair differ, and the grid divides them.
+    #[test]
+    fn runs_of_a_pair_end_steps_at_the_same_times() {
+        for (smooth, k, defect) in
+            [(true, 24, 1e-3), (true, 100, 1e-3), (true, 100, 1e-7), (true, 23, 1e-7), (false, 100, 1e-7)]
+        {
+            let pairs = Pairs::of(smooth, k, 8, 1e-9);
+            let grid = ComparisonGrid::of(pairs.base(k));
+            let first = pairs.first(&grid).unwrap_or_else(|| grid.whole(k as f64));
+            assert!((k..k + 6).contains(&first), "{k}: {first}");
+            let seconds = [true, false].map(|may_be_coarser| pairs.second(&grid, first, defect, may_be_coarser));
+            // A defect of 1e-7 is that of an error of 1e-14, far below the goal, and of 7e-12 for two thirds of the steps.
+            let coarser = pairs.close && defect < 1e-4;
+            assert!(if coarser { 3 * seconds[0] == 2 * first } else { seconds[0] > first }, "{seconds:?}, {first}");
+            assert!(2 * seconds[1] == if pairs.close { 3 } else { 4 } * first, "{seconds:?}, {first}");
+            let mut finer = first.max(seconds[0]);
+            for beyond in [1e-3, 1e-9, 1e-9, 1e-9, 1e-3] {
+                let next = pairs.next(&grid, finer, beyond);
+                assert!((finer + 1..=2 * finer).contains(&next) && next.is_multiple_of(grid.base()), "{finer}: {next}");
+                finer = next;
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_run_may_have_a_larger_error() {
+        // 1.5^12 is 130, and 1.5^24 is 17,000.
+        assert!((Pairs::goal_of_first(true, 8, 1e-9) / 1.3e-8 - 1.0).abs() < 0.01);
+        assert!((Pairs::goal_of_first(true, 16, 1e-9) / 1.68e-6 - 1.0).abs() < 0.01);
+        assert_eq!([Pairs::goal_of_first(true, 16, 1e-2), Pairs::goal_of_first(false, 16, 1e-9)], [1e-2, 1e-9]);
+    }
+}

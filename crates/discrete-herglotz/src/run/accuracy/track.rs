@@ -11,6 +11,8 @@ const SMALLEST: f64 = f64::from_bits(1);
 #[derive(Clone, Debug)]
 pub(crate) struct Track {
     pub states: Vec<[Vector; 2]>,
+    /// The actions at the states, if they were computed.
+    pub actions: Vec<f64>,
     /// The velocities at the states. They may be known more accurately than the momenta determine them, as in a strong
     /// magnetic field, where `p = v + A(q)`.
     pub velocities: Vec<Vector>,
@@ -61,6 +63,7 @@ impl Track {
     pub fn of_end(state: &State, v: Vector) -> Self {
         Track {
             states: vec![[state.q.clone(), state.p.clone()]],
+            actions: Vec::new(),
             velocities: vec![v],
             speed: f64::INFINITY,
             scales: None,

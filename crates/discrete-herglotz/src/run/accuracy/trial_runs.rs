@@ -43,6 +43,8 @@ pub(crate) struct TrialRuns<'t, 'p> {
     pub ends_at_newton_steps: bool,
     /// Whether a search ends if it requires many times more steps than the start of the motion.
     pub tests_uneven_steps: bool,
+    /// Whether all steps are sampled, since the energy did not follow its law.
+    pub samples_all_steps: bool,
     /// The steppers of the last two completed runs of Gauss collocation, with their numbers of stages and of steps.
     pub completed: Vec<CompletedRun<'p>>,
 }
@@ -68,6 +70,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             tests_newton_steps,
             ends_at_newton_steps: false,
             tests_uneven_steps,
+            samples_all_steps: false,
             completed: Vec::new(),
         }
     }
@@ -118,8 +121,9 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             let ending = self.run_with_samples(&mut *stepper, &settings, 1)?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        // The run itself may be one of these, and computes what is requested of it.
-        let action = self.request.may_be_a_trial_run() && self.request.needs.action;
+        // The run itself may be one of these, and computes what is requested of it; the energy of some needs the action.
+        let samples_few = self.samples_few_steps(nodes)?;
+        let action = samples_few || self.request.may_be_a_trial_run() && self.request.needs.action;
         let (options, collocation) = (StepperOptions { action, ..StepperOptions::default() }, self.collocation.clone());
         if hints.switching_functions && has_switching_functions(&*problem.system, problem.t0, &problem.start)? {
             let make = move |problem: &SystemProblem<'p>, h: f64, _: bool| {
@@ -138,7 +142,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         // For a linear motion the defect between the nodes contains no more than the order does.
         let (stride, points) = match stepper.is_linear() {
             true => (MAX_UNCHECKED_STEPS, 0),
-            false => (self.sampled_stride(stages, count, grid)?, settings.points),
+            false if samples_few => (count / grid.base(), settings.points),
+            false => (1, settings.points),
         };
         let settings = TrialSettings { points, ..settings };
         let ending = self.run_with_samples(&mut *stepper, &settings, stride)?;
@@ -149,13 +154,6 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             self.completed.insert(0, CompletedRun { stages, count, stepper });
         }
         Ok(ending)
-    }
-
-    /// The number of steps of which one is sampled. In a smooth motion whose nodes alone lie densely, the samples only show
-    /// how fast the defect falls: they are taken at the same times in all runs.
-    fn sampled_stride(&self, stages: usize, count: usize, grid: &ComparisonGrid) -> Result<usize, InputError> {
-        let all = self.tests_transformation || !self.is_smooth()?;
-        Ok(if all || stages * count < MIN_SAMPLE_POINTS { 1 } else { (count / grid.base()).max(1) })
     }
 
     /// The motion of [`gauss`](Self::gauss), without defect samples: near an equilibrium they see its round-off.
@@ -292,8 +290,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
     ) -> TrialEnd {
         let Request { problem, scales, .. } = self.request;
         let (t0, span) = (problem.t0, self.request.span);
-        let (mut states, mut round_off, mut taken, mut spent) =
-            (Vec::with_capacity(COMPARED_PARTS), Vec::with_capacity(COMPARED_PARTS), 0, 0);
+        let parts = || Vec::with_capacity(COMPARED_PARTS);
+        let (mut states, mut actions, mut round_off, mut taken, mut spent) = (parts(), Vec::new(), Vec::new(), 0, 0);
         let mut largest_size = norm(&[&problem.state.q, &problem.state.p]);
         let (mut velocities, mut speeds) =
             (Vec::with_capacity(COMPARED_PARTS), Velocities::new(problem, scales.as_ref()));
@@ -340,6 +338,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
                     || accumulated_roundings(taken) * self.request.equilibrium_round_off(run.time(), &x).displacement;
                 round_off.push(if decayed { of_all_steps() } else { 0.0 });
                 states.push([x.q, x.p]);
+                actions.push(x.z);
             }
             // A run continues on the reserve if it is expected to end within it.
             if spent > self.left && spent as f64 > part * self.reserve as f64 {
@@ -349,7 +348,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
         let (speed, scales) = (speeds.speed(taken), scales.clone());
-        let track = Track { states, round_off, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
+        let track =
+            Track { states, actions, round_off, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
         ending.unwrap_or(TrialEnd::Completed(track))
     }
 }
