@@ -34,3 +34,23 @@ fn the_midpoint_rule_is_of_second_order() {
         assert!((slope - 2.0).abs() < 0.15, "{slope} between {:?} and {:?}", pair[0], pair[1]);
     }
 }
+
+/// Calls for a requested error have at most this error; the oscillator reaches each of the four.
+#[test]
+fn calls_reach_the_requested_errors() {
+    let out = std::env::temp_dir().join(format!("calls_{}", std::process::id()));
+    let program = Command::new(env!("CARGO_BIN_EXE_work_precision"))
+        .args(["--calls", "--problem", "P1f", "--z", "on", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(program.status.success(), "{}", String::from_utf8_lossy(&program.stderr));
+    let table = std::fs::read_to_string(out.join("calls.csv")).unwrap();
+    std::fs::remove_dir_all(&out).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 4, "{table}");
+    for row in rows {
+        let [requested, error, ratio] = [2, 3, 9].map(|i| row[i].parse::<f64>().unwrap());
+        assert!(error <= requested && ratio > 0.0, "{table}");
+    }
+}
