@@ -105,17 +105,35 @@ pub(crate) fn selected<'p>(
     StepSelection { integrator, count, h, error, ended: None, end: None }
 }
 
-/// Refines the steps until two runs agree.
+/// Refines the steps until two runs agree. Of a smooth motion runs with numbers of steps in the ratio 2 : 3 are compared
+/// first; if this does not succeed, all motions are searched in the same way.
 pub(crate) fn converge(
     trials: &mut TrialRuns<'_, '_>,
     stages: usize,
     goal: f64,
     compared: Compared,
 ) -> Result<Converged, Ended> {
+    if matches!(compared, Compared::Steps) && trials.is_smooth()? {
+        let found = search(trials, stages, goal, compared, true);
+        if !matches!(found, Err(Ended::Refused(InputError::Accuracy { .. }))) {
+            return found;
+        }
+        trials.samples_all_steps = true;
+    }
+    search(trials, stages, goal, compared, false)
+}
+
+/// Refines the steps until two runs agree.
+fn search(
+    trials: &mut TrialRuns<'_, '_>,
+    stages: usize,
+    goal: f64,
+    compared: Compared,
+    smooth: bool,
+) -> Result<Converged, Ended> {
     let (wanted, t0, span) = (trials.wanted, trials.request.problem.t0, trials.request.span);
     let failed = |reached, cause| InputError::Accuracy { wanted, reached, cause };
     let s = stages as f64;
-    let smooth = matches!(compared, Compared::Steps) && trials.is_smooth()?;
     let goal_of_first = Pairs::goal_of_first(smooth, stages, goal);
     let grid_of = |k: usize, pairs: Pairs| match compared {
         Compared::Steps => ComparisonGrid::of(pairs.base(k)),
