@@ -49,8 +49,7 @@ impl<'p> Discretization<'p> {
     /// The problem of a request with the selected steps.
     pub fn new(request: &Request<'p>, selection: &StepSelection<'p>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, scales, parts, .. } = request.clone();
-        let StepSelection { ref integrator, count, h, error, .. } = *selection;
-        let integrator = integrator.clone();
+        let (integrator, &StepSelection { count, h, error, .. }) = (selection.integrator.clone(), selection);
         let switches = has_switching_functions(&*problem.system, problem.t0, &problem.start)?;
         let info = integrator.info();
         if switches && info.in_transformed_time {

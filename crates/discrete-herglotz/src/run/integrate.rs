@@ -24,12 +24,10 @@ pub(crate) fn integrate(
 ) -> Result<Outcome, InputError> {
     let mut run = Integration::new(plan, observers, from)?;
     run.start();
-    run.take_over(plan.take_end());
     while run.status.is_none() && !run.over {
         let first = run.taken;
         let before = run.needs_start().then(|| (run.stepper.time(), run.stepper.state()));
-        let chunk = run.next() - first;
-        if let Err(cause) = run.advance(chunk) {
+        if let Err(cause) = run.advance() {
             run.fail(cause);
             break;
         }
@@ -67,6 +65,8 @@ pub(super) struct Integration<'r, 'p, 'o> {
     pub stepper: Box<dyn Stepper + 'p>,
     pub checks: Checks<'r, 'p>,
     pub taken: usize,
+    /// The end of a trial run that took the same steps, if nothing between is observed or checked.
+    known_end: Option<Box<dyn Stepper + 'p>>,
     /// Whether the last step has been taken.
     over: bool,
     /// If the motion has come to rest, the time until which observers have seen it.
@@ -112,8 +112,20 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
         }
         // A run may be resumed at its end.
         let over = steps.is_over(taken, stepper.time());
-        let (status, end) = (None, None);
-        let mut run = Integration { plan, observers, info, stepper, checks, taken, over, rested_until, status, end };
+        let known_end = if from.is_none() { plan.take_end() } else { None };
+        let mut run = Integration {
+            plan,
+            observers,
+            info,
+            stepper,
+            checks,
+            taken,
+            known_end,
+            over,
+            rested_until,
+            status: None,
+            end: None,
+        };
         if from.is_some() || plan.rests_after == Some(0) {
             run.look_for_rest(true);
         }
@@ -145,25 +157,17 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
         self.checks.needs_start(self.taken) || self.next_observed(self.taken) == self.taken + 1
     }
 
-    /// Ends the run with the end of a trial run that took the same steps: nothing between was observed or checked.
-    fn take_over(&mut self, end: Option<Box<dyn Stepper + 'p>>) {
-        let Some(stepper) = end.filter(|_| self.taken == 0 && self.status.is_none() && !self.over) else { return };
-        self.stepper = stepper;
-        self.taken = self.plan.steps.count;
-        self.checks.multiply(self.taken, self.taken, self.stepper.sigma());
-        self.over = true;
-        let mut step =
-            TakenSteps { stepper: &mut *self.stepper, before: None, first: 0, taken: self.taken, over: true };
-        self.status = self.checks.check(&mut step);
-        if self.status.is_none() {
-            self.observe(0, None);
-        }
-    }
-
-    fn advance(&mut self, chunk: usize) -> Result<(), StepError> {
-        let (done, cause) = match self.stepper.advance_until(chunk, self.plan.steps.t_end) {
-            Ok(done) => (done, Ok(())),
-            Err(failure) => (failure.taken, Err(failure.cause)),
+    /// Takes the steps up to the next one that is observed or checked, or all of them if they are known.
+    fn advance(&mut self) -> Result<(), StepError> {
+        let chunk = self.next() - self.taken;
+        let (done, cause) = if let Some(end) = self.known_end.take() {
+            self.stepper = end;
+            (self.plan.steps.count, Ok(()))
+        } else {
+            match self.stepper.advance_until(chunk, self.plan.steps.t_end) {
+                Ok(done) => (done, Ok(())),
+                Err(failure) => (failure.taken, Err(failure.cause)),
+            }
         };
         self.taken += done;
         self.checks.multiply(self.taken, done, self.stepper.sigma());

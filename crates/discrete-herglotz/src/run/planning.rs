@@ -75,14 +75,13 @@ impl<'p> Request<'p> {
             let count = first_guess(self, DEFAULT_STAGES, wanted);
             let h = self.span / count as f64;
             let integrator = self.integrator.clone().unwrap_or_else(|| collocation.gauss(DEFAULT_STAGES));
-            return Ok((StepSelection { integrator, count, h, error: Some(0.0), ended: None, end: None }, Some(0)));
+            return Ok((StepSelection::new(integrator, count, h, Some(0.0)), Some(0)));
         }
         let Some(t_end) = self.time_of_rest(collocation.clone()) else {
             return Ok((select_steps(self, wanted, collocation, terminal)?, None));
         };
         let span = t_end - self.problem.t0;
-        let until_rest = Request { t_end, span, ends_only: false, ..self.clone() };
-        let moving = select_steps(&until_rest, wanted, collocation, terminal)?;
+        let moving = select_steps(&Request { t_end, span, ..self.clone() }, wanted, collocation, terminal)?;
         let (ended, rests_after) = (moving.ended, Some(moving.count));
         Ok((StepSelection { ended, ..moving.extended_by(self.span / span) }, rests_after))
     }
@@ -101,7 +100,7 @@ impl<'p> Request<'p> {
         integrator.check()?;
         // The stepper needs a nonzero step size, although it takes no step.
         let h = f64::EPSILON * max_or_nan(self.problem.t0.abs(), 1.0);
-        Plan::new(self, StepSelection { integrator, count: 0, h, error, ended: None, end: None })
+        Plan::new(self, StepSelection::new(integrator, 0, h, error))
     }
 
     /// The given steps of the given integrator.
@@ -109,14 +108,7 @@ impl<'p> Request<'p> {
         let Some(integrator) = self.integrator.clone() else { return Err(InputError::NoIntegrator) };
         let rate = if integrator.info().in_transformed_time { Some(self.dt_dtau()?) } else { None };
         let span = self.span;
-        let of = |count: usize, integrator| StepSelection {
-            integrator,
-            count,
-            h: span / count as f64,
-            error: None,
-            ended: None,
-            end: None,
-        };
+        let of = |count: usize, integrator| StepSelection::new(integrator, count, span / count as f64, None);
         match (steps, rate) {
             (Steps::Count(0), _) => Err(NO_STEP),
             (Steps::Count(_), Some(_)) => Err(InputError::Hypothesis { hypothesis: SIZED }),

@@ -72,5 +72,12 @@ pub(crate) struct StepSelection<'p> {
     pub end: Option<Box<dyn Stepper + 'p>>,
 }
 
+impl<'p> StepSelection<'p> {
+    /// These steps over the whole span.
+    pub fn new(integrator: SharedIntegrator<'p>, count: usize, h: f64, error: Option<f64>) -> Self {
+        StepSelection { integrator, count, h, error, ended: None, end: None }
+    }
+}
+
 /// The largest number of steps: up to it `t0 + k h` resolves times to a thousandth of a step.
 pub(crate) const MAX_STEPS: f64 = (1u64 << 42) as f64;

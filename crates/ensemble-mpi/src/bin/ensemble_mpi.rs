@@ -84,7 +84,7 @@ impl Table {
 
 /// Writes a message to stderr at once, so that those of several ranks are not mixed.
 fn report(message: &str) {
-    // Nothing can be told if stderr is closed.
+    // The message is lost if stderr is closed.
     let _ = io::stderr().write_all(message.as_bytes());
 }
 

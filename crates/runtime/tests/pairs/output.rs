@@ -287,13 +287,13 @@ fn fit(problem: &Problem, system: &System, name: &str, times: &[f64]) -> Result<
     };
     // The data hold the parameter, and the search passes no other event.
     let strength = slopes.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
-    let misfit = |value: f64| {
+    let sum_of_squares = |value: f64| {
         let changed = problem.with(name, value);
         let near = motion(&changed, (0.0, changed.start), times, None)?;
         let rows = near.rows.iter().zip(&truth.rows).map(|(a, b)| (a[0] - b[0]).powi(2));
         (near.impacts.len() == truth.impacts.len()).then(|| rows.sum::<f64>())
     };
-    if strength < 0.1 || misfit(guess).is_none() {
+    if strength < 0.1 || sum_of_squares(guess).is_none() {
         return Err(Sensitive);
     }
     let started = problem.with(name, guess);
@@ -307,10 +307,13 @@ fn fit(problem: &Problem, system: &System, name: &str, times: &[f64]) -> Result<
     }
     let found = fitted.fit.parameters[0];
     let right = differ(&format!("fit of {name}"), &[found], &[value], 1e-6 / strength.min(1.0));
-    // The misfit may have another minimum on the way: rows beside impacts have kinks.
-    let other = [-1e-4, 1e-4].map(|by| misfit(found + by * value.abs().max(0.1)));
-    match (misfit(found), other) {
-        (Some(least), [Some(below), Some(above)]) if right.is_err() && least < below.min(above) => Err(Sensitive),
+    if right.is_ok() {
+        return right;
+    }
+    // The sum of squares may have another minimum on the way: rows beside impacts have kinks.
+    let beside = [-1e-4, 1e-4].map(|by| sum_of_squares(found + by * value.abs().max(0.1)));
+    match (sum_of_squares(found), beside) {
+        (Some(least), [Some(below), Some(above)]) if least < below.min(above) => Err(Sensitive),
         _ => right,
     }
 }

@@ -26,13 +26,8 @@ pub(crate) fn by_doubled_steps<'p>(
     // Half the order, so that the start of the asymptotic range is not missed.
     let decrease = f64::powf(2.0, 0.5 * order);
     let goal = MAX_DISTANCE_FROM_REFERENCE * wanted;
-    let selected = |count: usize, error: f64| StepSelection {
-        integrator: integrator.clone(),
-        count,
-        h: trials.request.span / count as f64,
-        error: Some(error),
-        ended: None,
-        end: None,
+    let selected = |count: usize, error: f64| {
+        StepSelection::new(integrator.clone(), count, trials.request.span / count as f64, Some(error))
     };
     let mut count = grid.whole(first_guess(trials.request, DEFAULT_STAGES, wanted) as f64);
     let (mut known, mut before, mut best, mut stagnations): (Option<Track>, _, _, _) =

@@ -35,8 +35,6 @@ pub(crate) struct Converged {
     /// Whether the finer run costs less: its fixed-point iterations converge, where longer steps need Newton's
     /// method.
     pub finer_is_cheaper: bool,
-    /// Whether the numbers of steps of the two runs are in a ratio of less than 2.
-    pub close: bool,
     pub reference: Track,
     pub grid: ComparisonGrid,
     /// Whether the search found a narrow feature, or defects that do not decrease like those of a smooth motion: the
@@ -93,16 +91,9 @@ pub(crate) fn selected<'p>(
     if let ComparisonGrid::Times = found.grid {
         // The last step is about half as long as the others, so that round-off does not add a step.
         let count = (found.reference.tau / h + 0.5).ceil().max(1.0);
-        return StepSelection {
-            integrator,
-            count: count as usize,
-            h: found.reference.tau / (count - 0.5),
-            error,
-            ended: None,
-            end: None,
-        };
+        return StepSelection::new(integrator, count as usize, found.reference.tau / (count - 0.5), error);
     }
-    StepSelection { integrator, count, h, error, ended: None, end: None }
+    StepSelection::new(integrator, count, h, error)
 }
 
 /// Refines the steps until two runs agree. Of a smooth motion runs with numbers of steps in the ratio 2 : 3 are compared
@@ -144,9 +135,10 @@ fn search(
     let first = k.max(LONG_SEARCH_STEPS / MIN_RATIO_FOR_DIVISION);
     let mut pairs = Pairs::of(smooth, k, stages, goal);
     let mut grid = grid_of(k, pairs);
+    // The number of runs that ended because of Newton's method.
+    let mut newton_runs = 0;
     // The number of steps of the next run, if that before it is known; whether it may be smaller. In general the iteration
     // does not converge for steps that are longer than the first guess.
-    let mut newton_runs = 0;
     let (mut next, mut may_be_coarser) = (None, trials.request.iterates_accelerations());
     let (mut best, mut stagnations, mut narrow_features, mut failures) = (f64::INFINITY, 0, 0, (0, 0.0));
     // The smallest distance of two runs, regardless of a third one; and the reason why they do not agree.
@@ -282,7 +274,6 @@ fn search(
                 defect: coarse.defect,
                 order,
                 finer_is_cheaper: fine.cost < coarse.cost,
-                close: pairs.close,
                 reference: fine.clone(),
                 grid,
                 irregular: irregular || narrow_features > 0 || fall > MAX_DEFECT_ORDER * s,

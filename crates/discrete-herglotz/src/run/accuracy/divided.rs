@@ -62,14 +62,7 @@ pub(crate) fn divided_steps<'p>(trials: &mut TrialRuns<'_, 'p>) -> Result<StepSe
             let repeat = |trials: &mut TrialRuns<'_, 'p>| trials.divided(integrator, count, &grid);
             let last_digit = trials.error_of_last_digit([&first, &second], repeat)?;
             let (h, error) = (span / count as f64, Some(max_or_nan(error, last_digit)));
-            return Ok(StepSelection {
-                integrator: trials.collocation.divided_gauss(integrator),
-                count,
-                h,
-                error,
-                ended: None,
-                end: None,
-            });
+            return Ok(StepSelection::new(trials.collocation.divided_gauss(integrator), count, h, error));
         }
         let distances = first.distances(&second);
         let order = f64::log2(before / error);

@@ -33,14 +33,8 @@ impl<'p> Request<'p> {
         let request = Request { integrator: None, needs: terminal.needs(), ..self.clone() };
         let count = first_guess(self, EVENT_SEARCH.stages, EVENT_SEARCH_ERROR).max(MIN_EVENT_SEARCH_STEPS);
         let h = self.span / count as f64;
-        let selection = StepSelection {
-            integrator: collocation.divided_gauss(EVENT_SEARCH),
-            count,
-            h,
-            error: Some(EVENT_SEARCH_ERROR),
-            ended: None,
-            end: None,
-        };
+        let integrator = collocation.divided_gauss(EVENT_SEARCH);
+        let selection = StepSelection::new(integrator, count, h, Some(EVENT_SEARCH_ERROR));
         let plan = Plan::new(&request, selection).ok()?;
         let outcome = integrate(&plan, &mut vec![terminal, Box::new(Budget)], None).ok()?;
         match outcome.status {

@@ -19,11 +19,14 @@ const FINER: usize = 9;
 /// The ratio of their numbers of steps.
 const RATIO: f64 = 1.5;
 
+/// The part of what a prediction allows at which it aims, since the error is only about the square of the defect.
+const MARGIN: f64 = 0.1;
+
 /// How the numbers of steps of a search follow each other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pairs {
     /// Whether runs in the ratio 2 : 3 are compared; otherwise those with k and 2k steps.
-    pub close: bool,
+    close: bool,
     s: f64,
     goal: f64,
 }
@@ -40,7 +43,7 @@ impl Pairs {
             return goal;
         }
         let gain = RATIO.powf(ERROR_ORDER_PER_DEFECT_ORDER * stages as f64);
-        (MAX_PREDICTED_ERROR * goal * gain).min(0.1 * MAX_PREDICTIVE_DISTANCE).max(goal)
+        (MAX_PREDICTED_ERROR * goal * gain).min(MARGIN * MAX_PREDICTIVE_DISTANCE).max(goal)
     }
 
     /// The base of the grid on which a first run with about k steps is compared.
@@ -62,7 +65,7 @@ impl Pairs {
         let of_coarser = defect.powi(2) * RATIO.powf(2.0 * self.s);
         let of_first = of_coarser / RATIO.powf(ERROR_ORDER_PER_DEFECT_ORDER * self.s);
         // Both must be such that the runs agree.
-        let coarser = of_coarser <= MAX_PREDICTIVE_DISTANCE && of_first <= 0.1 * MAX_PREDICTED_ERROR * self.goal;
+        let coarser = of_coarser <= MAX_PREDICTIVE_DISTANCE && of_first <= MARGIN * MAX_PREDICTED_ERROR * self.goal;
         if coarser && may_be_coarser { COARSER * grid.base() } else { FINER * grid.base() }
     }
 

@@ -62,7 +62,7 @@ pub(crate) fn select_steps<'p>(
     };
     // The motion after this end is not computed.
     let span = t_end - request.problem.t0;
-    let part = Request { t_end, span, ends_only: false, ..request.clone() };
+    let part = Request { t_end, span, ..request.clone() };
     Ok(select(&part)?.extended_by(request.span / span))
 }
 
@@ -190,16 +190,14 @@ fn in_transformed_time<'p>(
 /// The smallest number of steps of a Gauss method that the converged runs allow, with the error that they predict; that of
 /// one of these runs, if they differ by little.
 fn min_step_count(stages: usize, wanted: f64, found: &Converged, longer: bool) -> (usize, f64) {
-    let Converged { k, finer, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, close, .. } = *found;
+    let Converged { k, finer, errors: [error, beyond], defect, order, finer_is_cheaper, irregular, .. } = *found;
     let (target, predicted) = (TARGET_ERROR * wanted, PREDICTED_ERROR * wanted);
     let steps =
         |order: f64| (k as f64 * (max_or_nan(error, MIN_PREDICTIVE_ERROR) / predicted).powf(1.0 / order)).ceil();
-    // Steps that end at a kink by chance agree, while other steps do not.
-    if irregular || order < stages as f64 / MAX_STAGES_PER_ORDER {
-        return if error <= target { (k, error) } else { (finer, beyond) };
-    }
-    // One of these runs may be the run, and is then known. It is taken whatever is observed, which does not change a motion.
-    if close {
+    // Steps that end at a kink by chance agree, while other steps do not. Runs that differ by little leave nothing to gain,
+    // and one of them may be the run itself; it is taken whatever is observed, which does not change a motion.
+    let close = finer < 2 * k;
+    if close || irregular || order < stages as f64 / MAX_STAGES_PER_ORDER {
         return if error <= target { (k, error) } else { (finer, beyond) };
     }
     if finer_is_cheaper {

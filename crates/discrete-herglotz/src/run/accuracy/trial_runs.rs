@@ -121,9 +121,11 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             let ending = self.run_with_samples(&mut *stepper, &settings, 1)?;
             return Ok(ending.with_tau(stepper.tau()));
         }
-        // The run itself may be one of these, and computes what is requested of it; the energy of some needs the action.
+        // The run itself may be one of these, and computes what is requested of it; the energy depends on the action if L
+        // does.
         let samples_few = self.samples_few_steps(nodes)?;
-        let action = samples_few || self.request.may_be_a_trial_run() && self.request.needs.action;
+        let for_energy = samples_few && !problem.structure.z_free;
+        let action = for_energy || self.request.may_be_a_trial_run() && self.request.needs.action;
         let (options, collocation) = (StepperOptions { action, ..StepperOptions::default() }, self.collocation.clone());
         if hints.switching_functions && has_switching_functions(&*problem.system, problem.t0, &problem.start)? {
             let make = move |problem: &SystemProblem<'p>, h: f64, _: bool| {
@@ -259,14 +261,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         count: usize,
         grid: &ComparisonGrid,
     ) -> Result<TrialEnd, InputError> {
-        let selection = StepSelection {
-            integrator: integrator.clone(),
-            count,
-            h: self.step(count, grid),
-            error: None,
-            ended: None,
-            end: None,
-        };
+        let selection = StepSelection::new(integrator.clone(), count, self.step(count, grid), None);
         let stepper = Discretization::new(&self.request.bare(), &selection).and_then(|steps| steps.stepper(false));
         let mut stepper = match stepper {
             Ok(stepper) => stepper,

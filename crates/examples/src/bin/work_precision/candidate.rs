@@ -119,3 +119,54 @@ impl<L: Lagrangian<N>, const N: usize> Candidate for OfLibrary<L, N> {
         Ok(Run { state, steps: plan.count() as u64, evaluations: stepper.evaluations(), seconds })
     }
 }
+
+/// A call for a problem: with given steps of an integrator, or for a requested error.
+struct Call<L, const N: usize> {
+    lagrangian: L,
+    by: Option<AnyIntegrator>,
+    name: String,
+    problem: Problem,
+    z: Action,
+}
+
+impl<L: Lagrangian<N>, const N: usize> Candidate for Call<L, N> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn order(&self) -> u32 {
+        self.by.map_or(0, |by| by.order())
+    }
+
+    fn control(&self) -> Control {
+        if self.by.is_some() { Control::Step } else { Control::Tolerance }
+    }
+
+    fn run(&self, control: f64) -> Result<Run, RunError> {
+        let clock = Instant::now();
+        let motion = discrete_herglotz::Problem::new(&self.lagrangian, 0.0, self.problem.point())?;
+        let run = match self.by {
+            Some(by) => motion.by(by).steps(Steps::Size(control)),
+            None => motion.accuracy(control),
+        };
+        let run = if self.z == Action::On { run } else { run.without_action() };
+        let outcome = run.run(Until::Time(self.problem.duration))?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let n = outcome.q.len();
+        let v = outcome.v.map_or_else(|| vec![f64::NAN; n], |v| v.iter().copied().collect());
+        let state = outcome.q.iter().copied().chain(v).chain(outcome.z).collect();
+        Ok(Run { state, steps: outcome.steps as u64, evaluations: outcome.evaluations, seconds })
+    }
+}
+
+/// A candidate that times whole calls, from the Lagrangian to the outcome: with given steps of an integrator, or for a
+/// requested error.
+pub fn call<L: Lagrangian<N> + 'static, const N: usize>(
+    lagrangian: L,
+    by: Option<AnyIntegrator>,
+    problem: &Problem,
+    z: Action,
+) -> Box<dyn Candidate> {
+    let name = by.map_or_else(|| "accuracy".to_owned(), |by| by.to_string());
+    Box::new(Call { lagrangian, by, name, problem: *problem, z })
+}

@@ -137,7 +137,7 @@ fn entries() -> Result<Vec<Entry>, Failure> {
     let mut all = Vec::new();
     for (problem, z) in variants() {
         let entry = |origin| move |candidate| Entry { problem, z, origin, candidate };
-        all.extend(library::candidates(problem, z)?.into_iter().map(entry(Origin::Library)));
+        all.extend(library::candidates(problem, z, library::Timed::Steps)?.into_iter().map(entry(Origin::Library)));
         all.extend(peers::candidates(problem, z).into_iter().map(entry(Origin::Peer)));
     }
     Ok(all)
