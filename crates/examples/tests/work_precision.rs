@@ -38,7 +38,7 @@ fn the_midpoint_rule_is_of_second_order() {
     }
 }
 
-/// Calls for a requested error have at most this error; the four errors differ.
+/// Calls for a requested error have at most this error.
 #[test]
 fn calls_reach_the_requested_errors() {
     let table = table("calls.csv", &["--calls", "--problem", "P6f", "--z", "on"]);
