@@ -110,6 +110,12 @@ fn lines() -> Result<Vec<Line>, InputError> {
         let mut rows = Rows::at(times.iter().copied())?.without_action();
         by_eight().observe(&mut rows).run(late)
     };
+    let hundred: Vec<f64> = (0..100_000).map(|k| f64::from(k) / 100.0 + 0.0037).collect();
+    let dense = |exact: bool| {
+        let mut rows = Rows::at(hundred.iter().copied())?.without_action();
+        let run = by_eight().observe(&mut rows);
+        if exact { run.with_exact_states().run(late) } else { run.run(late) }
+    };
     let crossing = |at: f64| {
         let mut lowest = Events::new([Event::new(move |_, x| x.q[0] - at)]).without_action();
         by_eight().observe(&mut lowest).run(late)
@@ -158,6 +164,7 @@ fn lines() -> Result<Vec<Line>, InputError> {
         )?,
         line(("rows", "pendulum, blanes_moan_6"), whole(recorded), whole(unrecorded))?,
         line(("rows between steps", "pendulum, gauss_8"), whole(between), whole(|| by_eight().run(late)))?,
+        line(("steps to a hundred rows", "pendulum, gauss_8"), whole(|| dense(true)), whole(|| dense(false)))?,
         line(
             ("event without a crossing", "pendulum, gauss_8"),
             whole(|| crossing(9.0)),

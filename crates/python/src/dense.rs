@@ -55,11 +55,14 @@ impl RunMonitor for NodeStore {
     }
 }
 
-/// Dense output of a motion: a state is computed by a step from the node before it.
+/// Dense output of a motion: a state is on polynomials that resolve the motion from the node before it, or it is computed by a
+/// step from that node.
 #[pyclass(frozen, module = "herglotz._core")]
 pub struct Dense {
     system: herglotz_runtime::System,
     by: AnyIntegrator,
+    /// Whether states between nodes are computed by steps that end there.
+    exact: bool,
     nodes: Nodes,
     /// The times of the resets, with the states before them.
     resets: Vec<Start>,
@@ -108,7 +111,8 @@ pub fn nodes(py: Python<'_>, motion: &Motion, until: f64) -> PyResult<Dense> {
                                            `integrator`",
         )
     })?;
-    Ok(Dense { system: motion.system.clone(), by, nodes: store.nodes, resets: store.resets, until, rests_from })
+    let (system, exact) = (motion.system.clone(), motion.motion.exact);
+    Ok(Dense { system, by, exact, nodes: store.nodes, resets: store.resets, until, rests_from })
 }
 
 impl Dense {
@@ -149,6 +153,7 @@ impl Dense {
         let motion = herglotz_runtime::Motion {
             rows: Some(OutputTimes::At(times)),
             columns: all.to_vec(),
+            exact: self.exact,
             ..herglotz_runtime::Motion::new(start, end, step_control)
         };
         Ok(self.system.record(&motion).map_err(value_error)?.1)

@@ -87,7 +87,7 @@ fn no_times() -> PyErr {
 impl Motion {
     #[new]
     #[pyo3(signature = (system, start, t, every, step_control, events, columns, conformal_factor, estimate, scales,
-                        project = false))]
+                        project = false, exact = false))]
     #[expect(clippy::too_many_arguments, reason = "they are those of `solve`, which names them")]
     fn new(
         system: &System,
@@ -101,6 +101,7 @@ impl Motion {
         estimate: bool,
         scales: Option<Bound<'_, PyAny>>,
         project: bool,
+        exact: bool,
     ) -> PyResult<Self> {
         let formula = &system.formula;
         let (q, velocity, is_momentum, z, near) = start;
@@ -158,6 +159,7 @@ impl Motion {
             estimate,
             scales,
             project,
+            exact,
             interrupt: Some(signals.interrupt()),
             ..herglotz_runtime::Motion::new(start, end, step_control)
         };

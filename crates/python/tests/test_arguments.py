@@ -71,6 +71,7 @@ ROWS = dict(
     observe={"square": "x^2"},
     conformal_factor=True,
     estimate=Changed(True, STEPS),
+    exact=Changed(True, dict(integrator="gauss_1", step=0.5)),
     momenta=Refused(["p"], "unknown name `p_x`", HAMILTONIAN),
     action=Refused("s", "unknown name `z`"),
     constraints=Changed("x^2 + y^2 = 1", PENDULUM),
@@ -80,7 +81,7 @@ SOLVE = MOTION | ROWS
 # What a loss or a differentiable motion has no use for, or has no derivatives of.
 NO_ROWS = {
     name: Refused(value, f"`{name}` cannot be given here")
-    for name, value in dict(observe={"square": "x^2"}, every=2, conformal_factor=True, estimate=True).items()
+    for name, value in dict(observe={"square": "x^2"}, every=2, conformal_factor=True, estimate=True, exact=True).items()
 }
 RESET = dict(t=3.0, parameters={"k": 1.0, "gamma": -0.1})
 NO_DERIVATIVES = dict(

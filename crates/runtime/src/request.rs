@@ -158,6 +158,10 @@ pub struct Motion {
     pub scales: Option<Vec<f64>>,
     /// Whether a start that violates the constraints of the formula is moved to them; otherwise it is refused.
     pub project: bool,
+    /// Whether the states between the ends of steps, of rows and events, are computed by steps of the integrator that end
+    /// there, so that the map to each of them is conformally contact; otherwise they are on polynomials, which are as
+    /// accurate and take less time.
+    pub exact: bool,
     /// Whether every step is passed to [`RunMonitor::node`](crate::RunMonitor::node).
     pub nodes: bool,
     /// Whether the motion is refused if it could not be interrupted and [resumed](crate::System::resume).
@@ -182,6 +186,7 @@ impl Motion {
             estimate: false,
             scales: None,
             project: false,
+            exact: false,
             nodes: false,
             resumable: false,
             interrupt: None,

@@ -42,6 +42,8 @@ fn small_rows(text: &str, coordinates: &str, parameters: &[(&str, f64)], motion:
         rows: Some(motion.rows.clone()),
         columns,
         conformal_factor: motion.conformal_factor,
+        // As those of lattices.
+        exact: true,
         ..Motion::new(motion.start.clone(), motion.end, step_control)
     };
     system.record(&asked).unwrap().1

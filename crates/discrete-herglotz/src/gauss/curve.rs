@@ -7,11 +7,13 @@ mod between;
 mod comparison;
 mod sample;
 
+use crate::Vector;
 use crate::gauss::dense::SolvedStep;
 use crate::gauss::resolution::defect_sample::{DefectSample, SAMPLE_SETS};
 use crate::gauss::stages::stage_values::CondensedStages;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::condensed::Condensed;
+use crate::integration::StageVectors;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
@@ -45,11 +47,11 @@ pub(crate) struct Curve {
     pub s: usize,
     pub t: f64,
     pub h: f64,
-    pub q: Vec<f64>,
-    pub p: Vec<f64>,
+    pub q: Vector,
+    pub p: Vector,
     pub z: f64,
-    pub v: Vec<Stages>,
-    pub force: Vec<Stages>,
+    pub v: StageVectors,
+    pub force: StageVectors,
     pub rate: Stages,
     pub l: Stages,
     /// Whether z is part of the stage equations; if not, `l` holds L at `z = 0`.
@@ -61,13 +63,13 @@ pub(crate) struct Curve {
 impl Curve {
     /// A curve with its start, and stages that are 0 until they are set.
     pub fn new(s: usize, t: f64, h: f64, q: &[f64], p: &[f64], z: f64) -> Self {
-        let zero = || vec![Stages::ZERO; q.len()];
+        let zero = || StageVectors::from_elem(Stages::ZERO, q.len());
         Curve {
             s,
             t,
             h,
-            q: q.to_vec(),
-            p: p.to_vec(),
+            q: q.into(),
+            p: p.into(),
             z,
             v: zero(),
             force: zero(),

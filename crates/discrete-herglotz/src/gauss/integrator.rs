@@ -74,6 +74,16 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         Ok(Box::new(GaussStepper::new(problem, self.stages, h, options)?))
     }
 
+    fn stepper_with_stages(
+        &self,
+        problem: &Problem<'a, L, N>,
+        stages: usize,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
+        GaussCollocation { stages }.stepper(problem, h, options).map(Some)
+    }
+
     fn batch_kernel(&self) -> Option<BatchKernel> {
         // The batch evaluates L.
         if const { L::HINTS.hamiltonian } { None } else { Some(BatchKernel::Gauss { stages: self.stages }) }
@@ -124,5 +134,15 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         } else {
             Err(InputError::NoTimeTransformation)
         }
+    }
+
+    fn stepper_with_stages(
+        &self,
+        problem: &Problem<'a, L, N>,
+        stages: usize,
+        h: f64,
+        options: StepperOptions,
+    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
+        GaussCollocation { stages }.stepper(problem, h, options).map(Some)
     }
 }

@@ -242,6 +242,10 @@ impl RunSupport for GaussStepper<'_> {
         });
     }
 
+    fn restart(&mut self, t: f64, state: &State, v: &Vector) -> bool {
+        self.steps.restart(t, state, v)
+    }
+
     fn save(&self) -> Option<Vec<u64>> {
         Some(words_of(&self.steps))
     }

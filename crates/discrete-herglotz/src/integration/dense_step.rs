@@ -3,6 +3,7 @@
 use crate::numbers::registers::MAX_STAGES;
 use crate::solve::chebyshev::{MAX_DEGREE, node};
 use crate::{State, Vector};
+use contact_geom::numbers::max_or_nan;
 use smallvec::SmallVec;
 use std::sync::OnceLock;
 
@@ -109,17 +110,45 @@ impl DenseStep {
         }));
     }
 
+    /// Estimates of the errors of q, of p and of z between the ends, from the last two coefficients of the polynomials, each
+    /// with the size of the terms.
+    pub(crate) fn truncation_errors(&self) -> [[f64; 2]; 3] {
+        let s = self.s;
+        // The integral of the last Legendre polynomial is at most this.
+        let integral = self.h.abs() / (2 * s - 1) as f64;
+        let of = |series: &Series, size: f64| {
+            let last = max_or_nan(series.0[s - 1].abs(), series.0[s.saturating_sub(2)].abs());
+            let all = series.0[..s].iter().fold(0.0, |size, c| max_or_nan(size, c.abs()));
+            [integral * last, max_or_nan(size, self.h.abs() * all)]
+        };
+        let larger = |a: [f64; 2], b: [f64; 2]| [max_or_nan(a[0], b[0]), max_or_nan(a[1], b[1])];
+        let [q, p] = [(&self.v, &self.start.q), (&self.force, &self.start.p)]
+            .map(|(of_x, x)| of_x.iter().fold([0.0, x.amax()], |found, series| larger(found, of(series, 0.0))));
+        let rate = of(&self.rate, 1.0)[0];
+        [q, [p[0] + rate * p[1], p[1]], of(&self.l, self.start.z.abs())]
+    }
+
+    /// The state at a time in the step, and rho there.
+    pub(crate) fn state_and_rho(&self, t: f64) -> (State, f64) {
+        self.at_fraction_with_rho((t - self.t) / self.h)
+    }
+
     /// The state at a fraction of the step.
     pub(crate) fn at_fraction(&self, fraction: f64) -> State {
+        self.at_fraction_with_rho(fraction).0
+    }
+
+    fn at_fraction_with_rho(&self, fraction: f64) -> (State, f64) {
         let p = polynomials(self.s, fraction);
         let integrals = integrals(self.s, &p, fraction);
         let integral = |series: &Series| self.h * series.value(&integrals, self.s);
         let rho = 1.0 - integral(&self.rate);
-        State {
+        let state = State {
             q: self.start.q.iter().zip(&self.v).map(|(q, v)| q + integral(v)).collect(),
             p: self.start.p.iter().zip(&self.force).map(|(p, force)| (p + integral(force)) / rho).collect(),
             z: self.start.z + integral(&self.l),
-        }
+        };
+        (state, rho)
     }
 }
 

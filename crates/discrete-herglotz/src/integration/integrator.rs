@@ -108,6 +108,21 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError>;
 
+    /// A stepper of contact Gauss collocation with another number of stages, for the states between the ends of a step of
+    /// collocation, see [`LastStep::at`](crate::run::LastStep::at). The default, for other methods, is `None`.
+    ///
+    /// # Errors
+    /// Those of [`stepper`](Self::stepper).
+    fn stepper_with_stages(
+        &self,
+        _problem: &Problem<'a, L, N>,
+        _stages: usize,
+        _h: f64,
+        _options: StepperOptions,
+    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
+        Ok(None)
+    }
+
     /// The force of the constraints, `G^T lambda` or `omega^T mu`, at a point of the motion, for an integrator that is
     /// [constrained](MethodInfo::constrained). The default is 0.
     ///

@@ -1,5 +1,6 @@
 //! Quantities of a motion that are computed from its states.
 
+use crate::run::ResolvedStep;
 use crate::{DenseStep, State, StepError, Vector};
 
 /// A velocity of the motion near a state; `None` stands for the velocity at the start.
@@ -10,8 +11,8 @@ pub(crate) trait Motion {
     /// The velocity at a state; if several velocities have its momentum, the one close to `near`.
     fn velocity(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<Vector, StepError>;
 
-    /// The energy at a state.
-    fn energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<f64, StepError>;
+    /// The velocity and the energy at a state.
+    fn velocity_and_energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<(Vector, f64), StepError>;
 
     /// The derivatives `(qdot, pdot, zdot)` at a state.
     fn rates(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<State, StepError>;
@@ -28,4 +29,15 @@ pub(crate) trait Motion {
         near: NearbyVelocity<'_>,
         curve: Option<&DenseStep>,
     ) -> Result<(State, f64), StepError>;
+
+    /// The motion between the ends of a step that was not divided, with its conformal factor, as polynomials. `None`, the
+    /// default, where states within a step are computed by [steps](Self::state_within_step).
+    fn resolve(
+        &self,
+        _ends: (&(f64, State), &(f64, State)),
+        _sigma: f64,
+        _near: NearbyVelocity<'_>,
+    ) -> Option<ResolvedStep> {
+        None
+    }
 }

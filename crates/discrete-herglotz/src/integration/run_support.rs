@@ -1,6 +1,6 @@
 //! What a run uses of a stepper beyond its steps.
 
-use crate::{DenseStep, PlanEntry, State, StepFailure, Stepper, UnresolvedStep};
+use crate::{DenseStep, PlanEntry, State, StepFailure, Stepper, UnresolvedStep, Vector};
 
 /// What a [`Run`](crate::Run) uses of a [`Stepper`] beyond its steps and its state: the entries of a plan, saving for a
 /// resumed run, the check that the steps resolve the motion, and the end of a run in transformed time. Every method has
@@ -29,6 +29,12 @@ pub trait RunSupport: Stepper {
     /// Takes the initial guess of the first step from the dense output of a longer step with the same initial state.
     /// This affects only the number of iterations.
     fn guess(&mut self, _longer: &DenseStep) {}
+
+    /// Takes a time, a state and its velocity as the start of the next step, as a new stepper would; `false` where steps depend
+    /// on more than that, as on guesses from earlier steps.
+    fn restart(&mut self, _t: f64, _state: &State, _v: &Vector) -> bool {
+        false
+    }
 
     /// All data that change from step to step, as words for a bitwise resume; `None` where saving is not implemented.
     fn save(&self) -> Option<Vec<u64>> {

@@ -91,8 +91,8 @@ impl Motion for AtRest<'_> {
         self.motion.velocity(t, state, near)
     }
 
-    fn energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<f64, StepError> {
-        self.motion.energy(t, state, near)
+    fn velocity_and_energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<(Vector, f64), StepError> {
+        self.motion.velocity_and_energy(t, state, near)
     }
 
     fn rates(&self, _t: f64, state: &State, _near: NearbyVelocity<'_>) -> Result<State, StepError> {

@@ -103,6 +103,13 @@ impl<'p, 'o, P> Run<'p, 'o, P> {
         Run { needs: OutputRequest { conformal_factor: true, ..self.needs }, ..self }
     }
 
+    /// Computes the states between the ends of steps, as those of [`Rows`](crate::Rows) and
+    /// [`Events`](crate::run::Events), by steps of the integrator that end there, so that the map to each of them is
+    /// conformally contact like a step; for collocation, which otherwise takes them from polynomials in less time.
+    pub fn with_exact_states(self) -> Self {
+        Run { needs: OutputRequest { exact: true, ..self.needs }, ..self }
+    }
+
     /// Includes an error estimate in the outcome. For given steps it is computed by a run with twice as many steps of
     /// half the size, which costs twice as much as the run itself; for a requested accuracy it is the error found by
     /// the trial runs.

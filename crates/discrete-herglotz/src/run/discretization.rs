@@ -7,12 +7,15 @@ use crate::numbers::state_words::digest;
 use crate::resolution::thresholds::FEW_STAGES;
 use crate::run::observers::output_request::OutputRequest;
 use crate::run::request::{Request, StepSelection};
+use crate::run::resolved_step::ResolvedStep;
 use crate::switching::Collocation;
 use crate::switching::has_switching_functions;
 use crate::switching::stepper::of_integrator::of_integrator;
-use crate::system::AtState;
+use crate::system::{AtState, mass_matrix};
 use crate::{DenseStep, InputError, MethodInfo, Point, State, StepError, Stepper, StepperOptions, Vector};
 use contact_geom::Structure;
+use contact_geom::nalgebra::DMatrix;
+use std::cell::{OnceCell, RefCell};
 
 /// The largest number of unknowns of a step for which the matrix of a linear motion is always computed. A collocation
 /// step is then multiplication by this matrix, which is computed in double-double precision.
@@ -43,6 +46,10 @@ pub(crate) struct Discretization<'p> {
     pub switches: bool,
     /// The collocation steppers of a Lagrangian with switching functions, for parts of steps.
     parts: Option<Collocation<'p>>,
+    /// Steppers of the parts of steps, each for a number of parts.
+    pub(super) of_parts: RefCell<Vec<(usize, Box<dyn Stepper + 'p>)>>,
+    /// `M^-1` of a separable Lagrangian, `p = M v`, computed on demand.
+    inverse_mass: OnceCell<Option<DMatrix<f64>>>,
 }
 
 impl<'p> Discretization<'p> {
@@ -59,18 +66,36 @@ impl<'p> Discretization<'p> {
         if switches && info.constrained {
             return Err(InputError::KinksUnderConstraints);
         }
-        Ok(Discretization { problem, t_end, h, count, error, integrator, info, needs, scales, switches, parts })
+        let (of_parts, inverse_mass) = (RefCell::new(Vec::new()), OnceCell::new());
+        Ok(Discretization {
+            problem,
+            t_end,
+            h,
+            count,
+            error,
+            integrator,
+            info,
+            needs,
+            scales,
+            switches,
+            parts,
+            of_parts,
+            inverse_mass,
+        })
     }
 
     /// The problem with the structure that the steps use: for few steps a linear motion is solved like a nonlinear one,
     /// since the matrix of a step would cost more than the iterations.
     pub fn problem_for_steps(&self) -> SystemProblem<'p> {
-        let unknowns = self.info.collocation.unwrap_or(0) * self.problem.system.dimension();
-        let by_matrix =
-            unknowns <= MAX_UNKNOWNS_OF_SMALL_MATRIX || unknowns.pow(3) / CUBED_UNKNOWNS_PER_STEP <= self.count;
         let structure = self.problem.structure;
-        let structure = Structure { quadratic: structure.quadratic && by_matrix, ..structure };
-        SystemProblem { structure, ..self.problem.clone() }
+        let quadratic = structure.quadratic && self.pays_for_a_matrix(self.info.collocation.unwrap_or(0));
+        SystemProblem { structure: Structure { quadratic, ..structure }, ..self.problem.clone() }
+    }
+
+    /// Whether there are enough steps for the matrix of a linear motion, by collocation with this number of stages.
+    pub(super) fn pays_for_a_matrix(&self, stages: usize) -> bool {
+        let unknowns = stages * self.problem.system.dimension();
+        unknowns <= MAX_UNKNOWNS_OF_SMALL_MATRIX || unknowns.pow(3) / CUBED_UNKNOWNS_PER_STEP <= self.count
     }
 
     /// A stepper at the start of the run.
@@ -93,7 +118,7 @@ impl<'p> Discretization<'p> {
         self.integrator.stepper(problem, h, options)
     }
 
-    fn options(&self, check_resolution: bool) -> StepperOptions {
+    pub(super) fn options(&self, check_resolution: bool) -> StepperOptions {
         let OutputRequest { action, derivatives, .. } = self.needs;
         StepperOptions { action, check_resolution, parts: derivatives, undivided: false }
     }
@@ -125,21 +150,12 @@ impl<'p> Discretization<'p> {
         (steps, t_end): (usize, f64),
         guess: impl Fn(&mut dyn Stepper),
     ) -> Result<Box<dyn Stepper + 'p>, StepError> {
-        let SystemProblem { system, from_momentum, structure: claimed, interrupt, .. } = &self.problem;
+        let claimed = &self.problem.structure;
         let by = |quadratic: bool| {
-            let start = Point { q: from.q.clone(), v: v.clone(), z: from.z };
             // The double-double tables of the separable route depend on the step size: they are not computed for a few
             // steps.
             let separable = claimed.separable && (quadratic || self.info.collocation.is_none());
-            let problem = SystemProblem {
-                system: system.clone(),
-                t0: t,
-                start,
-                state: from.clone(),
-                from_momentum: *from_momentum,
-                structure: Structure { quadratic, separable, ..*claimed },
-                interrupt: *interrupt,
-            };
+            let problem = self.problem_at((t, from), v, Structure { quadratic, separable, ..*claimed });
             let h = if self.info.in_transformed_time { self.h } else { h };
             let mut stepper = make(&problem, h).map_err(step_error)?;
             guess(&mut *stepper);
@@ -147,6 +163,12 @@ impl<'p> Discretization<'p> {
             Ok(stepper)
         };
         by(false).or_else(|cause| if claimed.quadratic { by(true) } else { Err(cause) })
+    }
+
+    /// The problem from a state with its velocity.
+    pub(super) fn problem_at(&self, (t, from): (f64, &State), v: &Vector, structure: Structure) -> SystemProblem<'p> {
+        let start = Point { q: from.q.clone(), v: v.clone(), z: from.z };
+        SystemProblem { t0: t, start, state: from.clone(), structure, ..self.problem.clone() }
     }
 
     /// A stepper after one step from a time and a state to another time. The iteration starts from the curve of a
@@ -165,6 +187,21 @@ impl<'p> Discretization<'p> {
             }
         };
         self.advanced((*t0, from), &v, t - t0, (1, t), guess)
+    }
+
+    /// The velocity `M^-1 p` of a momentum of a separable Lagrangian, and `None` for any other.
+    fn velocity_of_separable(&self, p: &Vector) -> Option<Vector> {
+        let SystemProblem { system, t0, start, structure, .. } = &self.problem;
+        let inverse_mass = self.inverse_mass.get_or_init(|| {
+            let mass = || system.mass_matrix(*t0, start);
+            if structure.separable { mass_matrix::inverse(&mass()).ok() } else { None }
+        });
+        let inverse = inverse_mass.as_ref()?;
+        let mut v = Vector::zeros(p.len());
+        for (column, p) in inverse.column_iter().zip(p) {
+            v.iter_mut().zip(&column).for_each(|(v, entry)| *v += entry * p);
+        }
+        Some(v)
     }
 
     /// A guess of the velocity. For a constant mass the velocity is unique.
@@ -220,13 +257,27 @@ impl<'p> Discretization<'p> {
 
 impl Motion for Discretization<'_> {
     fn velocity(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<Vector, StepError> {
+        if let Some(v) = self.velocity_of_separable(&state.p) {
+            return if v.iter().all(|v| v.is_finite()) { Ok(v) } else { Err(StepError::NonFinite) };
+        }
         self.problem.system.legendre_inverse(t, state, self.guess(near)).map(|x| x.v)
     }
 
-    fn energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<f64, StepError> {
-        let AtState { x, l, .. } = self.problem.system.at_state(t, state, self.guess(near))?;
-        let energy = x.v.dot(&state.p) - l;
-        if energy.is_finite() { Ok(energy) } else { Err(StepError::NonFinite) }
+    fn velocity_and_energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<(Vector, f64), StepError> {
+        let system = &self.problem.system;
+        let (v, l) = match self.velocity_of_separable(&state.p) {
+            Some(v) => {
+                let x = Point { q: state.q.clone(), v, z: state.z };
+                let l = system.value(t, &x);
+                (x.v, l)
+            }
+            None => {
+                let AtState { x, l, .. } = system.at_state(t, state, self.guess(near))?;
+                (x.v, l)
+            }
+        };
+        let energy = v.dot(&state.p) - l;
+        if energy.is_finite() { Ok((v, energy)) } else { Err(StepError::NonFinite) }
     }
 
     fn rates(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<State, StepError> {
@@ -265,5 +316,14 @@ impl Motion for Discretization<'_> {
     ) -> Result<(State, f64), StepError> {
         let run = self.step_to(from, t, near, curve)?;
         Ok((run.state(), run.sigma()))
+    }
+
+    fn resolve(
+        &self,
+        ends: (&(f64, State), &(f64, State)),
+        sigma: f64,
+        near: NearbyVelocity<'_>,
+    ) -> Option<ResolvedStep> {
+        Discretization::resolve(self, ends, sigma, near)
     }
 }

@@ -50,7 +50,8 @@ pub(crate) fn end_within_step(
     let end = view_of_part(plan, &*part, from, (findings, taken));
     let stop = observers.step(&end).break_value()?;
     let t = stop.at.as_ref()?.0;
-    Some((stop, end.within(t).ok().and_then(|there| there.log_factor)))
+    let there = end.last_step().and_then(|step| end.within(&step, t).ok());
+    Some((stop, there.and_then(|there| there.log_factor)))
 }
 
 /// The view of a part of a step for the observers.

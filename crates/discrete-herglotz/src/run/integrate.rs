@@ -206,7 +206,8 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
             let end = self.plan.view(&*self.stepper, before, findings, (self.taken, last));
             let stop = self.observers.step(&end).break_value();
             if let Some(Stop { at: Some((t, _)), .. }) = stop
-                && let Ok(StepView { log_factor: Some(there), .. }) = end.within(t)
+                && let Some(step) = end.last_step()
+                && let Ok(StepView { log_factor: Some(there), .. }) = end.within(&step, t)
             {
                 self.checks.findings.log_factor = there;
             }

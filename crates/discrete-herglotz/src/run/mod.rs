@@ -14,6 +14,7 @@ mod outcome;
 mod plan;
 mod planning;
 mod request;
+mod resolved_step;
 mod resume_state;
 
 pub use any_integrator::{AnyIntegrator, UnknownIntegrator};
@@ -39,4 +40,5 @@ pub use observers::step_view::{StepView, Stop};
 pub use outcome::Outcome;
 pub use plan::Plan;
 pub use request::{Steps, Until};
+pub(crate) use resolved_step::ResolvedStep;
 pub use resume_state::{CheckpointError, ResumeState};

@@ -104,6 +104,10 @@ pub(crate) struct RunTable {
     /// Whether a start that violates the constraints is moved to them; otherwise it is refused, with its distance.
     #[serde(default)]
     pub project: bool,
+    /// Whether rows and events within steps are computed by steps of the integrator that end there, so that the map to each of
+    /// them is contact. Otherwise they are on polynomials, which are as accurate and take less time.
+    #[serde(default)]
+    pub exact: bool,
     /// The size of each coordinate, in the order of the coordinates, where they differ much: the errors of each
     /// coordinate and its velocity are measured in units of its size.
     pub scales: Option<Location<Vec<f64>>>,

@@ -47,6 +47,7 @@ pub struct Scene {
     estimate: bool,
     scales: Option<Vec<f64>>,
     project: bool,
+    exact: bool,
     text: String,
     spans: Spans,
 }
@@ -191,6 +192,7 @@ impl Scene {
             estimate: file.want.estimate,
             scales: run.scales.as_deref().cloned(),
             project: run.project,
+            exact: run.exact,
             text: text.to_owned(),
             spans: Spans {
                 lagrangian,
@@ -227,7 +229,7 @@ impl Scene {
     /// The motion with no output but its end.
     pub fn bare_motion(&self) -> Motion {
         let motion = Motion::new(self.start.clone(), self.end, self.step_control);
-        Motion { scales: self.scales.clone(), project: self.project, ..motion }
+        Motion { scales: self.scales.clone(), project: self.project, exact: self.exact, ..motion }
     }
 
     /// The fit of its motion to data, if it has one.
@@ -430,5 +432,6 @@ fn additions(file: &File, tables: &[(Location<String>, Table)]) -> String {
         file.system.constraints.iter().flat_map(|all| all.iter()).map(|c| c.as_str()).collect();
     let constraints =
         if constraints.is_empty() { String::new() } else { format!(" {constraints:?} {}", file.run.project) };
-    format!("{:?} {} {breaks:?} {resets:?}{constraints}", pairs(&file.force), tables::fingerprint(tables))
+    let exact = if file.run.exact { " exact" } else { "" };
+    format!("{:?} {} {breaks:?} {resets:?}{constraints}{exact}", pairs(&file.force), tables::fingerprint(tables))
 }

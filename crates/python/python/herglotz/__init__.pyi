@@ -483,6 +483,7 @@ def solve(
     observe: Mapping[str, Expression] | None = None,
     conformal_factor: bool = False,
     estimate: bool = False,
+    exact: bool = False,
     scales: ArrayLike | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,

@@ -161,7 +161,7 @@ def value_and_grad(loss):
 
     def run(*arguments, **named):
         given = _SOLVE.bind(arguments, named)
-        refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe", "every", "conformal_factor", "estimate")
+        refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe", "every", "conformal_factor", "estimate", "exact")
         # As a column it is traced, and its parameters and tables are found.
         of, request, *_ = request_of(**given | {"observe": {"loss": loss}})
         (text,) = request[5]

@@ -147,8 +147,9 @@ class Solution:
     def __call__(self, t):
         """Dense output: the states at any times of the motion, as accurate as its steps.
 
-        The first call runs the motion again and keeps the ends of its steps; a state within a step is computed by a
-        shorter step of the same integrator. At the time of a reset the state is that before it.
+        The first call runs the motion again and keeps the ends of its steps; a state within a step of collocation is on
+        polynomials that resolve the motion, and for other integrators, or with ``exact=True``, it is computed by a
+        shorter step. At the time of a reset the state is that before it.
 
         Parameters
         ----------

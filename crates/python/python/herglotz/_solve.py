@@ -27,6 +27,7 @@ def solve(
     observe=None,
     conformal_factor=False,
     estimate=False,
+    exact=False,
     scales=None,
     coordinates=None,
     parameters=None,
@@ -78,6 +79,9 @@ def solve(
     estimate : bool
         Whether `Solution.error_estimate` is computed. For given steps it takes a second run with steps of half the
         length, which costs twice as much as the first.
+    exact : bool
+        Whether rows and events within steps are computed by steps of the integrator that end there, so that the map to
+        each of them is contact. Otherwise they are on polynomials, which are as accurate and take less time.
     scales : array of shape (n,), optional
         The size of each coordinate, where they differ much or have different units: `accuracy` and `estimate` then
         apply to each coordinate and its velocity in units of its size.
@@ -138,6 +142,7 @@ def request_of(
     action=None,
     constraints=None,
     project=False,
+    exact=False,
     also=(),
 ):
     """The system and the request for the arguments of `solve`, with the names of the events and of the columns.
@@ -172,6 +177,7 @@ def request_of(
         estimate,
         copied(scales),
         project,
+        exact,
     )
     if parameters or tables:
         check_used(L, parameters, tables, given, [*texts_of_events(given_events), *columns, *also])

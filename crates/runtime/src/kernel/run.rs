@@ -49,6 +49,7 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
 pub(super) fn requested<'p, 'o, P>(run: Run<'p, 'o, P>, motion: &Motion, scales: Option<Vector>) -> Run<'p, 'o, P> {
     let run = if motion.action { run } else { run.without_action() };
     let run = if motion.conformal_factor { run.with_conformal_factor() } else { run };
+    let run = if motion.exact { run.with_exact_states() } else { run };
     let run = if motion.estimate { run.with_error_estimate() } else { run };
     match scales {
         Some(scales) => run.scales(scales),

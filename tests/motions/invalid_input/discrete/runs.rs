@@ -35,6 +35,7 @@ pub const TESTS: &[InputTest] = &[
             "Run::without_action",
             "Run::with_conformal_factor",
             "Run::with_error_estimate",
+            "Run::with_exact_states",
             "Run::scales",
             "Run::plan",
             "Run::run",

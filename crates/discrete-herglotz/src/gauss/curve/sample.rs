@@ -8,6 +8,7 @@ use crate::gauss::curve::between::Between;
 use crate::gauss::curve::comparison::Compare;
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::system::{ByPoints, Coordinates, InRegisters, Typed, add_force, few_coordinates, zeros};
+use crate::integration::StageVectors;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, Two, by_two};
@@ -114,10 +115,10 @@ impl<F: ScalarSystem> EvaluateInRegisters<'_, F> {
 pub(super) struct Sample {
     between: &'static Between,
     /// The polynomials and their integrals: velocities, positions, forces, momenta `rho p`.
-    pub v: Vec<Stages>,
-    pub q: Vec<Stages>,
-    pub f: Vec<Stages>,
-    pub y: Vec<Stages>,
+    pub v: StageVectors,
+    pub q: StageVectors,
+    pub f: StageVectors,
+    pub y: StageVectors,
     pub rate: Stages,
     pub one_minus_rho: Stages,
     pub l: Stages,
@@ -125,8 +126,8 @@ pub(super) struct Sample {
     /// L, and its gradient with the applied force: `L_q + f`, `L_v` and `L_z`; for a Lagrangian that is given by a contact
     /// Hamiltonian with `H_p` in the place of `L_v`.
     pub value: Stages,
-    pub force: Vec<Stages>,
-    pub momentum: Vec<Stages>,
+    pub force: StageVectors,
+    pub momentum: StageVectors,
     pub slope: Stages,
     /// The rates dt/dtau in transformed time.
     pub dt_dtau: Stages,
@@ -135,7 +136,7 @@ pub(super) struct Sample {
 impl Sample {
     /// The polynomials of a curve at a set of sample points.
     fn of(arch: Instructions, curve: &Curve, set: usize) -> Self {
-        let zero = || vec![Stages::ZERO; curve.q.len()];
+        let zero = || StageVectors::from_elem(Stages::ZERO, curve.q.len());
         let mut sample = Sample {
             between: Between::of(curve.s, set),
             v: zero(),

@@ -11,7 +11,7 @@ use crate::gauss::stages::mass_matrix::Mass;
 use crate::gauss::system::{CollocationSystem, PointRef, Typed};
 use crate::gauss::tables::stage_table::StageTable;
 use crate::gauss::work_summary::work_summary_in_transformed_time;
-use crate::integration::check_unforced;
+use crate::integration::{StageVectors, check_unforced};
 use crate::numbers::compensated::CompensatedSum;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
@@ -147,9 +147,9 @@ impl Run {
             return None;
         }
         let (general, from) = (&*self.general, &self.from);
-        let values = |x: &[CompensatedSum]| x.iter().map(|x| x.value).collect::<Vec<_>>();
+        let values = |x: &[CompensatedSum]| x.iter().map(|x| x.value).collect::<Vector>();
         let (q, end) = (values(&from.q), values(general.state().q));
-        let zeros = || vec![Stages::ZERO; q.len()];
+        let zeros = || StageVectors::from_elem(Stages::ZERO, q.len());
         let mut curve = Curve {
             s: general.table.s,
             t: from.t.value,

@@ -7,16 +7,17 @@ mod state_words;
 
 use crate::gauss::dense::{Solved, SolvedStep, StepStart};
 use crate::gauss::limits::FIRST_NEWTON_PAUSE;
-use crate::gauss::routes::{RouteState, StageRoute};
+use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::steps::sequence::Sequence;
 use crate::gauss::system::{CollocationSystem, PointGradient};
-use crate::numbers::compensated::copy_values;
+use crate::gauss::work_summary::GaussRoute;
+use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
 use crate::resolution::monitor::StepMonitor;
 use crate::resolution::thresholds::FEW_STAGES;
-use crate::{StepError, StepFailure};
+use crate::{State, StepError, StepFailure};
 use contact_geom::nalgebra::DMatrix;
 use retries::Tried;
 
@@ -136,6 +137,20 @@ impl GaussSteps {
     /// The time of the state.
     pub fn time(&self) -> f64 {
         self.t0 + self.k as f64 * self.h
+    }
+
+    /// Takes a time, a state and its velocity as the start of the next step, for steps that depend on nothing else.
+    pub fn restart(&mut self, t: f64, state: &State, v: &[f64]) -> bool {
+        if self.route.route() != GaussRoute::Linear {
+            return false;
+        }
+        let set = |to: &mut [CompensatedSum], x: &[f64]| to.iter_mut().zip(x).for_each(|(to, x)| *to = (*x).into());
+        let RouteStateMut { q, y, z } = self.route.state_mut();
+        set(q, &state.q);
+        set(y, v);
+        *z = state.z.into();
+        (self.t0, self.k, self.solved) = (t, 0, false);
+        true
     }
 
     /// The last step, if its stages are known.

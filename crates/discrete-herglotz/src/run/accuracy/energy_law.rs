@@ -19,7 +19,7 @@ impl TrialRuns<'_, '_> {
         let moving = Point { v: start.v.map(|v| v + 1.0), ..start.clone() };
         let is_free = || !hints.forced || system.applied_force(*t0, &moving).iter().all(|force| *force == 0.0);
         let has_law = structure.autonomous && structure.has_constant_rate();
-        let all = self.samples_all_steps || self.tests_transformation || nodes < MIN_SAMPLE_POINTS;
+        let all = self.samples_all_steps || self.tests_transformation || nodes < MIN_SAMPLE_POINTS / 2;
         Ok(!all && !hints.hamiltonian && has_law && self.is_smooth()? && is_free())
     }
 

@@ -105,8 +105,11 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         let (problem, h) = (&self.request.problem, self.step(count, grid));
         let nodes = stages * count;
         let points = match closely {
-            // The nodes of a smooth motion are points at which a narrow feature would be met.
-            true if self.is_smooth()? => MIN_SAMPLE_POINTS.saturating_sub(nodes).div_ceil(nodes).clamp(1, SAMPLE_SETS),
+            // The nodes of a smooth motion are points at which a narrow feature would be met, and so are those of the second
+            // run, without which no run is accepted.
+            true if self.is_smooth()? => {
+                (MIN_SAMPLE_POINTS / 2).saturating_sub(nodes).div_ceil(nodes).clamp(1, SAMPLE_SETS)
+            }
             true => MIN_SAMPLE_POINTS.div_ceil(nodes).min(SAMPLE_SETS),
             false => 1,
         };

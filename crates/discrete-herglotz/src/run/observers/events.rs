@@ -17,9 +17,9 @@ const TIMES_AT_REST: usize = 1024;
 /// All sign changes within a step are found. The functions are evaluated on an interpolant of the motion, at the
 /// Chebyshev-Lobatto nodes of the step: `s + 3` nodes, from 5 to 17, for a Gauss step with s stages, 5 for other
 /// methods. The Chebyshev coefficients of a function usually prove that it has no zero in the step. Otherwise the step
-/// is divided until the sign changes are separated. Each is located on states as accurate as those of the run, which
-/// are computed by steps of the same integrator that end there; two such steps are enough if the step resolves the
-/// motion.
+/// is divided until the sign changes are separated. Each is located on states as accurate as those of the run, see
+/// [`LastStep::at`]: where they are computed by steps of the integrator, two such steps are enough if the step resolves
+/// the motion.
 ///
 /// The function should be smooth along the motion; kinks and jumps are found by bisection. If it varies so fast that
 /// the sign changes within a step cannot be told apart, the run ends with [`StepError::EventUnresolved`]. What no

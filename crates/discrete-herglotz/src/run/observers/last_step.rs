@@ -2,8 +2,10 @@
 
 use crate::integration::motion::Motion;
 use crate::integration::{Piece, PieceStart};
+use crate::run::ResolvedStep;
 use crate::solve::chebyshev::node;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
+use std::cell::OnceCell;
 
 /// The degree of interpolation of a function along a step, if the method has no dense output: larger by one than that
 /// of the cubic curve through both ends.
@@ -15,6 +17,9 @@ const CURVATURE_DISTANCE: f64 = 1e-3;
 /// The largest relative difference between the slope of the interpolant and that of the motion with which the curvature
 /// is used: its error then changes a state at [`TaylorPolynomial::MAX_DISTANCE`] by less than round-off.
 const MAX_SLOPE_DIFFERENCE: f64 = 1e-4;
+
+/// The relative round-off of a time: a time that differs by less from the end of a step is that end.
+const TIME_ROUND_OFF: f64 = 2.0 * f64::EPSILON;
 
 /// The second-order Taylor polynomial of a motion about one of its states, in fractions of a step.
 pub(crate) struct TaylorPolynomial {
@@ -54,6 +59,8 @@ pub struct LastStep<'r> {
     stepper: &'r dyn Stepper,
     /// The curve of the step, if the method has one; computed on demand.
     curve: Option<Option<Box<DenseStep>>>,
+    /// The motion between the ends, if polynomials resolve it; computed on demand.
+    resolved: OnceCell<Option<Box<ResolvedStep>>>,
     /// The time derivatives of the state at both ends, computed on demand.
     rates: [Option<State>; 2],
 }
@@ -61,7 +68,8 @@ pub struct LastStep<'r> {
 impl<'r> LastStep<'r> {
     /// The step between two times with their states.
     pub(crate) fn new([from, to]: [(f64, State); 2], motion: &'r dyn Motion, stepper: &'r dyn Stepper) -> Self {
-        LastStep { origin: None, from, to, next: None, motion, stepper, curve: None, rates: [None, None] }
+        let resolved = OnceCell::new();
+        LastStep { origin: None, from, to, next: None, motion, stepper, curve: None, resolved, rates: [None, None] }
     }
 
     /// The pieces of this step, in their order, each with what happens at its start; none if it was not divided.
@@ -82,6 +90,7 @@ impl<'r> LastStep<'r> {
                 motion: self.motion,
                 stepper: self.stepper,
                 curve: Some(piece.dense.clone().map(Box::new)),
+                resolved: OnceCell::from(None),
                 rates: [None, None],
             };
             (piece.start, step)
@@ -110,8 +119,10 @@ impl<'r> LastStep<'r> {
         if fraction == 1.0 { self.to.0 } else { self.from.0 + fraction * (self.to.0 - self.from.0) }
     }
 
-    /// The state at a time between the ends, computed by a step of the same integrator that ends at this time. It is as
-    /// accurate as the states at the ends, and the map to it is conformally contact like a full step.
+    /// The state at a time between the ends, as accurate as those at the ends. For collocation it is on polynomials that
+    /// resolve the motion between the ends; for other methods, and where [exact](crate::run::OutputRequest::exact) states are requested, it
+    /// is computed by a step of the same integrator that ends at this time, so that the map to it is conformally contact like a
+    /// full step.
     ///
     /// # Errors
     /// Those of a step.
@@ -119,15 +130,36 @@ impl<'r> LastStep<'r> {
         if t == self.to.0 { Ok(self.to.1.clone()) } else { self.step_to(t).map(|(state, _)| state) }
     }
 
-    /// The same state with the `sigma_d` of the step that ends there; always computed by a step, except at the start.
+    /// The same state, with the conformal factor from the start of the step.
     pub(crate) fn step_to(&self, t: f64) -> Result<(State, f64), StepError> {
         if t == self.from.0 {
             return Ok((self.from.1.clone(), 1.0));
+        }
+        let is_part = self.origin.is_some() || self.next.is_some() || !self.stepper.pieces().is_empty();
+        if !is_part && (t - self.to.0).abs() <= TIME_ROUND_OFF * self.to.0.abs() {
+            return Ok((self.to.1.clone(), self.stepper.sigma()));
+        }
+        let is_inside = (t - self.from.0) * (t - self.to.0) <= 0.0;
+        if is_inside && let Some(resolved) = self.resolved() {
+            let (state, sigma) = resolved.at(t);
+            return if state.is_finite() && sigma > 0.0 { Ok((state, sigma)) } else { Err(StepError::NonFinite) };
         }
         let origin = self.origin.as_deref().unwrap_or(&self.from);
         let is_whole = origin.0 == self.from.0;
         let curve = self.curve.as_ref().and_then(Option::as_deref).filter(|_| is_whole);
         self.motion.state_within_step(origin, t, self.stepper.last_velocity().as_ref(), curve)
+    }
+
+    /// The motion between the ends, if polynomials resolve it.
+    fn resolved(&self) -> Option<&ResolvedStep> {
+        let LastStep { from, to, motion, stepper, .. } = self;
+        let resolved = self.resolved.get_or_init(|| {
+            let is_divided = !stepper.pieces().is_empty();
+            let near = stepper.last_velocity();
+            let found = if is_divided { None } else { motion.resolve((from, to), stepper.sigma(), near.as_ref()) };
+            found.map(Box::new)
+        });
+        resolved.as_deref()
     }
 
     /// Sets the time derivatives at its start, as computed for the preceding step.

@@ -13,12 +13,15 @@ pub struct OutputRequest {
     /// Whether the run is differentiated, so that an integrator with derivatives is selected for an accuracy, and the stages
     /// of the parts of divided steps are kept.
     pub derivatives: bool,
+    /// Whether states between the ends of a step are computed by steps of the integrator that end there, which are contact
+    /// like all others, and not from polynomials.
+    pub exact: bool,
 }
 
 impl OutputRequest {
     /// The action alone.
     pub const ACTION: OutputRequest =
-        OutputRequest { action: true, conformal_factor: false, saved: false, derivatives: false };
+        OutputRequest { action: true, conformal_factor: false, saved: false, derivatives: false, exact: false };
 
     /// The quantities of both requests.
     pub fn and(self, other: Self) -> Self {
@@ -27,6 +30,7 @@ impl OutputRequest {
             conformal_factor: self.conformal_factor || other.conformal_factor,
             saved: self.saved || other.saved,
             derivatives: self.derivatives || other.derivatives,
+            exact: self.exact || other.exact,
         }
     }
 }

@@ -152,8 +152,11 @@ impl<'f> Rows<'f> {
     }
 
     fn record(&mut self, at: &StepView<'_>) -> Result<(), StepError> {
-        let v = if self.velocity { Some(at.velocity()?) } else { None };
-        let energy = if self.energy { Some(at.energy()?) } else { None };
+        let (v, energy) = match (self.velocity, self.energy) {
+            (_, true) => at.velocity_and_energy().map(|(v, energy)| (self.velocity.then_some(v), Some(energy)))?,
+            (true, false) => (Some(at.velocity()?), None),
+            (false, false) => (None, None),
+        };
         let StepView { t, state, log_factor, .. } = at;
         let columns = self.columns.iter_mut().map(|(_, f)| f(*t, state)).collect();
         let z = self.needs.action.then_some(state.z);
@@ -173,11 +176,13 @@ impl<'f> Rows<'f> {
         let passed = |t: f64| if backward { t >= at.t } else { t <= at.t };
         // The last step ends at the end of the span up to round-off.
         let due: Vec<f64> = times[recorded..].iter().copied().take_while(|t| at.last || passed(*t)).collect();
+        let step = at.last_step();
         for t in due {
             if t == at.t {
                 self.record(at)?;
             } else if passed(t) {
-                self.record(&at.within(t)?)?;
+                let step = step.as_ref().ok_or(StepError::NonFinite)?;
+                self.record(&at.within(step, t)?)?;
             } else {
                 self.record(&StepView { t, state: at.state.clone(), before: None, ..*at })?;
             }

@@ -96,8 +96,8 @@ impl<'r> StepView<'r> {
     }
 
     /// The view at a time within the last step; see [`LastStep::at`].
-    pub(crate) fn within(&self, t: f64) -> Result<Self, StepError> {
-        let (state, sigma) = self.last_step().ok_or(StepError::NonFinite)?.step_to(t)?;
+    pub(crate) fn within(&self, step: &LastStep<'_>, t: f64) -> Result<Self, StepError> {
+        let (state, sigma) = step.step_to(t)?;
         let log_factor = self.log_factor.map(|of_end| match self.at_rest {
             // Over a long time `sigma_d` is below the smallest number.
             Some(RestInterval { rate, .. }) => of_end - rate * (self.t - t),
@@ -116,7 +116,12 @@ impl<'r> StepView<'r> {
     /// # Errors
     /// Those of [`velocity`](Self::velocity).
     pub fn energy(&self) -> Result<f64, StepError> {
-        self.motion.energy(self.t, &self.state, self.stepper.last_velocity().as_ref())
+        self.velocity_and_energy().map(|(_, energy)| energy)
+    }
+
+    /// The velocity and the energy, for the cost of the latter.
+    pub(crate) fn velocity_and_energy(&self) -> Result<(Vector, f64), StepError> {
+        self.motion.velocity_and_energy(self.t, &self.state, self.stepper.last_velocity().as_ref())
     }
 
     /// The step that ends here; `None` at the start, and where several steps were taken at once.
