@@ -61,7 +61,8 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    /// A curve with its start, and stages that are 0 until they are set.
+    /// A curve with its start, and stages that are 0 until they are set. Inlined, since it is large: it is made in its place.
+    #[inline(always)]
     pub fn new(s: usize, t: f64, h: f64, q: &[f64], p: &[f64], z: f64) -> Self {
         let zero = || StageVectors::from_elem(Stages::ZERO, q.len());
         Curve {

@@ -134,7 +134,8 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// The polynomials of a curve at a set of sample points.
+    /// The polynomials of a curve at a set of sample points. Inlined, since a sample is large: it is made in its place.
+    #[inline(always)]
     fn of(arch: Instructions, curve: &Curve, set: usize) -> Self {
         let zero = || StageVectors::from_elem(Stages::ZERO, curve.q.len());
         let mut sample = Sample {
