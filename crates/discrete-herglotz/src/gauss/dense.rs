@@ -1,10 +1,12 @@
 //! The solved stages of a step, and its collocation polynomial.
 
+use crate::gauss::stages::stage_values::CondensedStages;
 use crate::gauss::system::CollocationSystem;
 use crate::gauss::tables::coefficients::Coefficients;
 use crate::gauss::tables::condensed::Condensed;
 use crate::integration::SolvedStages;
 use crate::integration::dense_step::Series;
+use crate::numbers::instructions::Instructions;
 use crate::numbers::registers::{MAX_STAGES, Stages};
 use crate::numbers::state_words::saved;
 use crate::{DenseStep, Vector};
@@ -63,11 +65,18 @@ impl Solved<'_> {
     ) {
         let SolvedStep { t, from: start, mass } = *step;
         let (n, s) = (a.len(), table.s);
+        if wants_l {
+            let solved = CondensedStages { table, t, v0: &start.y, a, x, v: self.v };
+            let values = system.stage_values(Instructions::new(), solved);
+            self.l.0[..s].copy_from_slice(&values.0[..s]);
+        }
         for d in 0..n {
             let v = &mut self.v[d].0;
-            v.iter_mut().zip(&table.inverse_rho.0).for_each(|(v, inverse)| *v = inverse * start.y[d]);
-            for (column, a) in table.d.0.iter().zip(&a[d].0).take(s) {
-                v.iter_mut().zip(&column.0).for_each(|(v, entry)| *v += entry * a);
+            if !wants_l {
+                v.iter_mut().zip(&table.inverse_rho.0).for_each(|(v, inverse)| *v = inverse * start.y[d]);
+                for (column, a) in table.d.0.iter().zip(&a[d].0).take(s) {
+                    v.iter_mut().zip(&column.0).for_each(|(v, entry)| *v += entry * a);
+                }
             }
             v[s..].fill(0.0);
         }
@@ -79,9 +88,6 @@ impl Solved<'_> {
                     (0..n).map(|e| entry(e) * (rho * a[e].0[i])).reduce(|sum, term| sum + term).unwrap_or(0.0);
             }
             self.rate.0[i] = rho * table.gamma;
-            if wants_l {
-                self.l.0[i] = system.value_at_stage(t + table.times.0[i], i, x, self.v);
-            }
         }
         if wants_l && table.gamma != 0.0 {
             // So far the values are those of `L - gamma z`; this adds `gamma z`.

@@ -15,7 +15,6 @@ use crate::gauss::routes::hamiltonian::HamiltonianKernel;
 use crate::gauss::routes::separable::SeparableKernel;
 use crate::gauss::stages::curvature::curvature;
 use crate::integration::{AtState, at_state};
-use crate::numbers::registers::Stages;
 use crate::system::applied_force::AppliedForce;
 use crate::system::mass_matrix::{BLOCK, mass_matrix};
 use crate::theory::legendre_inverse;
@@ -137,9 +136,6 @@ pub(crate) trait SystemAtPoints {
     /// The value of L.
     fn value(&self, t: f64, x: PointRef<'_>) -> f64;
 
-    /// `L(t, q, v, 0)` at the i-th stage.
-    fn value_at_stage(&self, t: f64, i: usize, q: &[Stages], v: &[Stages]) -> f64;
-
     /// L, which is returned, its gradient, and `L_q + f`, as Newton's method for the stages evaluates them.
     fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut PointGradient, force: &mut [f64]) -> f64;
 
@@ -246,11 +242,6 @@ impl<L: Lagrangian<N>, const N: usize> SystemAtPoints for Typed<'_, L, N> {
 
     fn value(&self, t: f64, x: PointRef<'_>) -> f64 {
         Lagrangian::value(self.0, t, &vector_of(x.q), &vector_of(x.v), x.z)
-    }
-
-    fn value_at_stage(&self, t: f64, i: usize, q: &[Stages], v: &[Stages]) -> f64 {
-        let [q, v] = [q, v].map(|of| SVector::from_fn(|d, _| of[d].0[i]));
-        Lagrangian::value(self.0, t, &q, &v, 0.0)
     }
 
     fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut PointGradient, force: &mut [f64]) -> f64 {

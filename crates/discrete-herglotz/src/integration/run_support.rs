@@ -30,8 +30,8 @@ pub trait RunSupport: Stepper {
     /// This affects only the number of iterations.
     fn guess(&mut self, _longer: &DenseStep) {}
 
-    /// Takes a time, a state and its velocity as the start of the next step, as a new stepper would; `false` where steps depend
-    /// on more than that, as on guesses from earlier steps.
+    /// Takes a time, a state and its velocity as the start of the next step, which is then bitwise that of a new stepper; `false`
+    /// where the steps so far may have changed how further ones are taken.
     fn restart(&mut self, _t: f64, _state: &State, _v: &Vector) -> bool {
         false
     }

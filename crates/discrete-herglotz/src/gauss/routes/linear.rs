@@ -170,6 +170,10 @@ impl StageRoute for Linear {
         0
     }
 
+    fn restart(&mut self, _v: &[f64]) -> bool {
+        true
+    }
+
     fn reserve_newton(&mut self, _system: &dyn CollocationSystem) {}
 
     fn linearise_at_state(&mut self, _system: &dyn CollocationSystem, _t: f64) -> bool {

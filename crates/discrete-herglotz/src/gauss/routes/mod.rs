@@ -71,6 +71,12 @@ pub(crate) trait StageRoute: Saved {
 
     fn evaluations(&self) -> u64;
 
+    /// Forgets all steps but the state, so that the next one is as the first of a new route, from a velocity; `false` if the
+    /// route may have changed what it was made with. The default is `false`.
+    fn restart(&mut self, _v: &[f64]) -> bool {
+        false
+    }
+
     /// The velocity at the end of the last step, if the route has it.
     fn last_velocity(&self) -> Option<&[f64]> {
         None

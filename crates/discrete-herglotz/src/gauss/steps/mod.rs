@@ -11,7 +11,6 @@ use crate::gauss::routes::{RouteState, RouteStateMut, StageRoute};
 use crate::gauss::stages::fixed_point::IterationOutcome;
 use crate::gauss::steps::sequence::Sequence;
 use crate::gauss::system::{CollocationSystem, PointGradient};
-use crate::gauss::work_summary::GaussRoute;
 use crate::numbers::compensated::{CompensatedSum, copy_values};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::forget_branches;
@@ -139,15 +138,18 @@ impl GaussSteps {
         self.t0 + self.k as f64 * self.h
     }
 
-    /// Takes a time, a state and its velocity as the start of the next step, for steps that depend on nothing else.
+    /// Takes a time, a state and its velocity as the start of the next step, which is then that of new steps; `false` if the
+    /// steps so far may have changed how they are taken.
     pub fn restart(&mut self, t: f64, state: &State, v: &[f64]) -> bool {
-        if self.route.route() != GaussRoute::Linear {
+        if self.solution != Solution::FixedPointIteration || self.newton_steps > 0 || !self.route.restart(v) {
             return false;
         }
+        // The condensed routes have velocities.
+        let y = if self.mass.is_some() { v } else { &state.p };
         let set = |to: &mut [CompensatedSum], x: &[f64]| to.iter_mut().zip(x).for_each(|(to, x)| *to = (*x).into());
-        let RouteStateMut { q, y, z } = self.route.state_mut();
+        let RouteStateMut { q, y: of_y, z } = self.route.state_mut();
         set(q, &state.q);
-        set(y, v);
+        set(of_y, y);
         *z = state.z.into();
         (self.t0, self.k, self.solved) = (t, 0, false);
         true

@@ -61,11 +61,6 @@ impl SystemAtPoints for ByPoints<'_> {
         self.system.value(t, &point(x))
     }
 
-    fn value_at_stage(&self, t: f64, i: usize, q: &[Stages], v: &[Stages]) -> f64 {
-        let at = |of: &[Stages]| of.iter().map(|x| x.0[i]).collect();
-        self.system.value(t, &Point { q: at(q), v: at(v), z: 0.0 })
-    }
-
     fn stage_value(&self, t: f64, x: PointRef<'_>, gradient: &mut PointGradient, force: &mut [f64]) -> f64 {
         let x = point(x);
         set(gradient, &self.system.gradient(t, &x));

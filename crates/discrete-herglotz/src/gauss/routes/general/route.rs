@@ -43,6 +43,20 @@ impl StageRoute for General {
         self.evaluations
     }
 
+    fn restart(&mut self, v: &[f64]) -> bool {
+        if self.newton.is_some() || self.suspended_newton.is_some() || self.by_newton.is_some() {
+            return false;
+        }
+        (self.age, self.solved, self.predicted, self.one_minus_rho) = (0, false, false, 0.0);
+        for stages in [&mut self.l, &mut self.rate, &mut self.one_minus_rho_stages, &mut self.z_stages] {
+            *stages = Stages::ZERO;
+        }
+        self.known.copy_from_slice(v);
+        self.point.v.copy_from_slice(v);
+        self.guess();
+        true
+    }
+
     /// The velocity at the last stage of the last successful step, or that at the start.
     fn last_velocity(&self) -> Option<&[f64]> {
         Some(&self.known)

@@ -44,6 +44,17 @@ impl StageRoute for Separable {
         self.evaluations
     }
 
+    fn restart(&mut self, _v: &[f64]) -> bool {
+        let left = self.vectors.left();
+        let has_matrix = left.kappa != 0.0 || left.tail.is_some();
+        if has_matrix || self.newton.is_some() || self.suspended_newton.is_some() || self.positions.is_some() {
+            return false;
+        }
+        (self.far, self.warm, self.solved) = (false, false, false);
+        (self.steps_without_predictor, self.age, self.taken, self.review) = (0, 0, 0, 1);
+        true
+    }
+
     fn reserve_newton(&mut self, _system: &dyn CollocationSystem) {
         let (s, n) = (self.table.s, self.q.len());
         self.positions.get_or_insert_with(|| Box::new(PositionNewton::new(s, n)));
