@@ -100,7 +100,6 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Integrator::step_variation", "crates/discrete-herglotz/tests/constraints/derivatives"),
     ("DiscretizationMethod::step_jacobian", "tests/derivatives/discrete_tangents"),
     ("Integrator::step_formula", "takes no number"),
-    ("Integrator::stepper_with_stages", "makes steppers within steps of a run, from its problem"),
     ("RunSupport::restart", "takes a state of a run"),
     ("DiscretizationMethod::step_formula", "takes no number"),
     ("StepDetails::solved_stages", "takes no number"),

@@ -44,16 +44,6 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         self.integrator.stepper(&self.own(problem), h, options)
     }
 
-    fn stepper_with_stages(
-        &self,
-        problem: &Problem<'p, L, N>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'p>>, InputError> {
-        self.integrator.stepper_with_stages(&self.own(problem), stages, h, options)
-    }
-
     fn constraint_force(&self, lagrangian: &L, t: f64, x: &VelocityPoint<N>) -> Result<SVector<f64, N>, StepError> {
         self.integrator.constraint_force(lagrangian, t, x)
     }

@@ -74,16 +74,6 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for GaussColloca
         Ok(Box::new(GaussStepper::new(problem, self.stages, h, options)?))
     }
 
-    fn stepper_with_stages(
-        &self,
-        problem: &Problem<'a, L, N>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        GaussCollocation { stages }.stepper(problem, h, options).map(Some)
-    }
-
     fn batch_kernel(&self) -> Option<BatchKernel> {
         // The batch evaluates L.
         if const { L::HINTS.hamiltonian } { None } else { Some(BatchKernel::Gauss { stages: self.stages }) }
@@ -125,8 +115,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         &self,
         problem: &Problem<'a, L, N>,
         h: f64,
-        _: StepperOptions,
+        options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
+        if options.stages.is_some() {
+            return GaussCollocation { stages: self.stages }.stepper(problem, h, options);
+        }
         Integrator::<'a, L, N>::check(self, problem.lagrangian)?;
         // The stepper is compiled only for Lagrangians with a time transformation; the check rejects all others.
         if const { L::HINTS.time_transformation } {
@@ -134,15 +127,5 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for TransformedG
         } else {
             Err(InputError::NoTimeTransformation)
         }
-    }
-
-    fn stepper_with_stages(
-        &self,
-        problem: &Problem<'a, L, N>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        GaussCollocation { stages }.stepper(problem, h, options).map(Some)
     }
 }

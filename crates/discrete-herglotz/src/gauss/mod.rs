@@ -19,7 +19,7 @@ mod virtual_work;
 mod work_summary;
 
 pub(crate) use collocation_stepper::CollocationStepper;
-pub(crate) use dense::StepStart;
+pub(crate) use dense::{StepStart, curve_through};
 pub(crate) use integrator::info;
 pub(crate) use resolution::defect_sample::{DefectSample, SAMPLE_SETS};
 pub use routes::transformed::TransformedStepper;

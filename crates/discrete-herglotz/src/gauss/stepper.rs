@@ -47,6 +47,7 @@ impl<'a> GaussStepper<'a> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Self, InputError> {
+        let stages = options.stages.unwrap_or(stages);
         check_step(stages, h)?;
         let Problem { lagrangian, t0, state, start, structure, .. } = *problem;
         let start = Start {
@@ -80,6 +81,7 @@ impl<'a> GaussStepper<'a> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Self, InputError> {
+        let stages = options.stages.unwrap_or(stages);
         check_step(stages, h)?;
         let SystemProblem { system, t0, start, state, structure, .. } = problem;
         let points = ByPoints::new(system.clone());

@@ -20,16 +20,6 @@ pub(crate) trait BoundIntegrator<'a> {
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError>;
 
-    fn stepper_with_stages(
-        &self,
-        _problem: &SystemProblem<'a>,
-        _stages: usize,
-        _h: f64,
-        _options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        Ok(None)
-    }
-
     fn constraint_force(&self, _t: f64, x: &Point) -> Result<Vector, StepError> {
         Ok(Vector::zeros(x.q.len()))
     }
@@ -96,16 +86,6 @@ where
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         self.integrator.stepper(&problem.of(self.lagrangian), h, options)
-    }
-
-    fn stepper_with_stages(
-        &self,
-        problem: &SystemProblem<'a>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        self.integrator.stepper_with_stages(&problem.of(self.lagrangian), stages, h, options)
     }
 
     fn constraint_force(&self, t: f64, x: &Point) -> Result<Vector, StepError> {

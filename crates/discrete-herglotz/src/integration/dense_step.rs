@@ -110,22 +110,27 @@ impl DenseStep {
         }));
     }
 
-    /// Estimates of the errors of q, of p and of z between the ends, from the last two coefficients of the polynomials, each
-    /// with the size of the terms.
+    /// Estimates of the errors of q, of p and of z between the ends, each with the size of the terms. The coefficients of the
+    /// polynomials go on as the last ones decrease: two together, since those of an even or an odd function vanish in turn.
     pub(crate) fn truncation_errors(&self) -> [[f64; 2]; 3] {
         let s = self.s;
-        // The integral of the last Legendre polynomial is at most this.
-        let integral = self.h.abs() / (2 * s - 1) as f64;
-        let of = |series: &Series, size: f64| {
-            let last = max_or_nan(series.0[s - 1].abs(), series.0[s.saturating_sub(2)].abs());
+        // The integral of a Legendre polynomial beyond the last is at most this.
+        let integral = self.h.abs() / (2 * s + 1) as f64;
+        let of = |series: &Series| {
+            let pair =
+                |end: usize| series.0[end.saturating_sub(2)..end].iter().fold(0.0, |most, c| max_or_nan(most, c.abs()));
+            let (last, before) = (pair(s), pair(s.saturating_sub(2)));
+            let next = if last < before { last * (last / before) } else { last };
             let all = series.0[..s].iter().fold(0.0, |size, c| max_or_nan(size, c.abs()));
-            [integral * last, max_or_nan(size, self.h.abs() * all)]
+            [integral * next, self.h.abs() * all]
         };
-        let larger = |a: [f64; 2], b: [f64; 2]| [max_or_nan(a[0], b[0]), max_or_nan(a[1], b[1])];
-        let [q, p] = [(&self.v, &self.start.q), (&self.force, &self.start.p)]
-            .map(|(of_x, x)| of_x.iter().fold([0.0, x.amax()], |found, series| larger(found, of(series, 0.0))));
-        let rate = of(&self.rate, 1.0)[0];
-        [q, [p[0] + rate * p[1], p[1]], of(&self.l, self.start.z.abs())]
+        let of_all = |of_x: &Curves, x: &Vector| {
+            let larger = |a: [f64; 2], b: [f64; 2]| [max_or_nan(a[0], b[0]), max_or_nan(a[1], b[1])];
+            of_x.iter().map(of).fold([0.0, x.amax()], larger)
+        };
+        let (q, p, [l, of_l]) = (of_all(&self.v, &self.start.q), of_all(&self.force, &self.start.p), of(&self.l));
+        let rate = of(&self.rate)[0];
+        [q, [p[0] + rate * p[1], p[1]], [l, max_or_nan(of_l, self.start.z.abs())]]
     }
 
     /// The state at a time in the step, and rho there.

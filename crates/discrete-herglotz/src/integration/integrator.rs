@@ -79,6 +79,9 @@ pub struct StepperOptions {
     /// Whether the steps are known to need no division: they are parts of steps of an integrator that
     /// [divides](MethodInfo::divides) its steps.
     pub undivided: bool,
+    /// In place of the steps of a [collocation](MethodInfo::collocation) method those of contact Gauss collocation with
+    /// this number of stages, in physical time, for the states between the ends of a step.
+    pub stages: Option<usize>,
 }
 
 /// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of
@@ -107,21 +110,6 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError>;
-
-    /// A stepper of contact Gauss collocation with another number of stages, for the states between the ends of a step of
-    /// collocation, see [`LastStep::at`](crate::run::LastStep::at). The default, for other methods, is `None`.
-    ///
-    /// # Errors
-    /// Those of [`stepper`](Self::stepper).
-    fn stepper_with_stages(
-        &self,
-        _problem: &Problem<'a, L, N>,
-        _stages: usize,
-        _h: f64,
-        _options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        Ok(None)
-    }
 
     /// The force of the constraints, `G^T lambda` or `omega^T mu`, at a point of the motion, for an integrator that is
     /// [constrained](MethodInfo::constrained). The default is 0.

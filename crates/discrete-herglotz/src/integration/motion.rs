@@ -1,7 +1,7 @@
 //! Quantities of a motion that are computed from its states.
 
 use crate::run::ResolvedStep;
-use crate::{DenseStep, State, StepError, Vector};
+use crate::{DenseStep, State, StepError, Stepper, Vector};
 
 /// A velocity of the motion near a state; `None` stands for the velocity at the start.
 pub(crate) type NearbyVelocity<'v> = Option<&'v Vector>;
@@ -30,12 +30,12 @@ pub(crate) trait Motion {
         curve: Option<&DenseStep>,
     ) -> Result<(State, f64), StepError>;
 
-    /// The motion between the ends of a step that was not divided, with its conformal factor, as polynomials. `None`, the
-    /// default, where states within a step are computed by [steps](Self::state_within_step).
+    /// The motion between the ends of the last step of a stepper, which was not divided, as polynomials. `None`, the default,
+    /// where states within a step are computed by [steps](Self::state_within_step).
     fn resolve(
         &self,
         _ends: (&(f64, State), &(f64, State)),
-        _sigma: f64,
+        _stepper: &dyn Stepper,
         _near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
         None

@@ -95,7 +95,8 @@ pub(crate) const MAX_TRIAL_VALUE_DEFECT: f64 = 0.2;
 /// above it a narrow feature lies between the nodes.
 pub(crate) const MAX_DEFECT_RATIO: f64 = 30.0;
 
-/// The smallest number of sample points over the span of a trial run: features wider than their distance are detected.
+/// The smallest number of sample points over the span of a trial run: features wider than their distance are detected. The
+/// two trial runs of a smooth motion, which have other points, share them.
 pub(crate) const MIN_SAMPLE_POINTS: usize = 2000;
 
 /// Defects below this, relative to the momenta, are not distinguished from round-off where defects of two runs or of

@@ -117,16 +117,6 @@ impl<'a, L: Lagrangian<N> + 'a, const N: usize> Integrator<'a, L, N> for AnyInte
         each!(*self, integrator => integrator.stepper(problem, h, options))
     }
 
-    fn stepper_with_stages(
-        &self,
-        problem: &Problem<'a, L, N>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        each!(*self, integrator => integrator.stepper_with_stages(problem, stages, h, options))
-    }
-
     fn batch_kernel(&self) -> Option<BatchKernel> {
         each!(*self, integrator => Integrator::<'a, L, N>::batch_kernel(&integrator))
     }

@@ -120,7 +120,7 @@ impl<'p> Discretization<'p> {
 
     pub(super) fn options(&self, check_resolution: bool) -> StepperOptions {
         let OutputRequest { action, derivatives, .. } = self.needs;
-        StepperOptions { action, check_resolution, parts: derivatives, undivided: false }
+        StepperOptions { action, check_resolution, parts: derivatives, ..StepperOptions::default() }
     }
 
     /// A stepper that starts at a state with its velocity and has taken steps of size h: a given number of them, or
@@ -321,9 +321,9 @@ impl Motion for Discretization<'_> {
     fn resolve(
         &self,
         ends: (&(f64, State), &(f64, State)),
-        sigma: f64,
+        stepper: &dyn Stepper,
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
-        Discretization::resolve(self, ends, sigma, near)
+        Discretization::resolve(self, ends, stepper, near)
     }
 }

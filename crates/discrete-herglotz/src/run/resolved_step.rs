@@ -1,18 +1,15 @@
 //! The motion between the ends of a step, as polynomials that resolve it.
 
+use crate::gauss::{MAX_STAGES, curve_through};
 use crate::integration::motion::{Motion, NearbyVelocity};
 use crate::run::discretization::Discretization;
-use crate::{DenseStep, State, StepperOptions, Vector};
+use crate::{DenseStep, State, Stepper, StepperOptions, Vector};
 use contact_geom::Structure;
 use contact_geom::numbers::max_or_nan;
 
-/// The largest number of stages of a part. The next larger one than twice that of the step resolves the motion better than
-/// the step does.
-const MAX_STAGES: usize = 16;
-
-/// The number of parts that is tried first, and the largest number of stages of the step for which it suffices in general:
-/// the parts together have the order of the step at the distance of its nodes.
-const FIRST_PARTS: [(usize, usize); 2] = [(8, 1), (16, 2)];
+/// The smallest number of stages with which the collocation polynomial of a step itself is tried: with fewer it resolves the
+/// motion only where the steps are far too short.
+const MIN_STAGES: usize = 6;
 
 /// The largest number of parts. A motion that is not resolved by them is not smooth within the step.
 const MAX_PARTS: usize = 16;
@@ -28,18 +25,17 @@ const ROUND_OFF: f64 = 8.0 * f64::EPSILON;
 
 /// The motion between the ends of a step of collocation.
 ///
-/// The collocation polynomial of a step with s stages has order s between the ends, whose states have order 2s. Here the
-/// motion from the start of the step is that of collocation with more stages, or with shorter steps: these parts are
-/// accepted where the last coefficients of their polynomials are small compared with the error of the step. That error,
-/// the difference of the two states at the end, is added with the factor `u^(p + 1)` at the fraction u of the step, where p
-/// is the order: so a step of the same method that ends there differs from the motion, up to the next order, and the curve is
-/// continuous.
+/// The collocation polynomial of a step with s stages has order s between the ends, whose states have order 2s. Where it does
+/// not resolve the motion, collocation with 2s + 1 stages, at most 16, does so from the start of the step, over the whole of it
+/// or over equal parts. Polynomials are accepted where their errors, estimated from their last coefficients, are small compared
+/// with the error of the step. That error, the difference of the two states at the end, is added with the factor `u^(p + 1)` at
+/// the fraction u of the step, where p is the order: so a step of the same method that ends there differs from the motion, up
+/// to the next order, and the curve is continuous.
 pub(crate) struct ResolvedStep {
-    from: f64,
+    parts: Parts,
+    /// The time at the start, and the length.
+    t: f64,
     length: f64,
-    parts: Vec<DenseStep>,
-    /// The logarithm of the conformal factor at the start of each part.
-    log_factors: Vec<f64>,
     /// The difference of the step's end and that of the parts, and that of the logarithms of their conformal factors.
     difference: State,
     of_log_factor: f64,
@@ -49,105 +45,149 @@ pub(crate) struct ResolvedStep {
 impl ResolvedStep {
     /// The state at a time in the step, and the conformal factor from its start.
     pub fn at(&self, t: f64) -> (State, f64) {
-        let u = (t - self.from) / self.length;
-        let k = ((u * self.parts.len() as f64) as usize).min(self.parts.len() - 1);
-        let part = &self.parts[k];
-        let (mut state, rho) = part.state_and_rho(t);
+        let (curves, u) = (&self.parts.curves, (t - self.t) / self.length);
+        let k = ((u * curves.len() as f64) as usize).min(curves.len() - 1);
+        let (mut state, rho) = curves[k].state_and_rho(t);
         let share = u.powi(self.order + 1);
-        add(&mut state.q, &self.difference.q, share);
-        add(&mut state.p, &self.difference.p, share);
+        let add = |to: &mut Vector, d: &Vector| to.iter_mut().zip(d).for_each(|(x, d)| *x += share * d);
+        add(&mut state.q, &self.difference.q);
+        add(&mut state.p, &self.difference.p);
         state.z += share * self.difference.z;
-        (state, (self.log_factors[k] - rho.ln() + share * self.of_log_factor).exp())
+        (state, (self.parts.log_factors[k] - rho.ln() + share * self.of_log_factor).exp())
     }
 }
 
-fn add(to: &mut [f64], difference: &[f64], factor: f64) {
-    to.iter_mut().zip(difference).for_each(|(x, d)| *x += factor * d);
+/// Equal parts of a step.
+struct Parts {
+    curves: Vec<DenseStep>,
+    /// The logarithm of the conformal factor at the start of each part, and at the end of the last.
+    log_factors: Vec<f64>,
+    end: State,
+}
+
+impl Parts {
+    /// The curve of the last step of a stepper, without its action where that is not needed.
+    fn curve(stepper: &dyn Stepper, with_action: bool) -> Option<DenseStep> {
+        if with_action { stepper.dense() } else { stepper.solved_stages().map(curve_through) }
+    }
+
+    /// The last step of a stepper as a whole.
+    fn whole(stepper: &dyn Stepper, with_action: bool) -> Option<Self> {
+        let log_factors = vec![0.0, stepper.sigma().ln()];
+        Some(Parts { curves: vec![Self::curve(stepper, with_action)?], log_factors, end: stepper.state() })
+    }
+
+    /// The next steps of a stepper.
+    fn of_steps(stepper: &mut dyn Stepper, count: usize, with_action: bool) -> Option<Self> {
+        let (mut curves, mut log_factors, mut log_factor) = (Vec::with_capacity(count), vec![0.0], 0.0);
+        for _ in 0..count {
+            stepper.advance(1).ok()?;
+            curves.push(Self::curve(stepper, with_action)?);
+            log_factor += stepper.sigma().ln();
+            log_factors.push(log_factor);
+        }
+        Some(Parts { curves, log_factors, end: stepper.state() })
+    }
+
+    /// The difference of a state from that at the end.
+    fn difference(&self, to: &State) -> State {
+        State { q: &to.q - &self.end.q, p: &to.p - &self.end.p, z: to.z - self.end.z }
+    }
+}
+
+/// The number of parts after a number of them whose error exceeds the bound by a factor, `None` beyond the most: the error
+/// decreases as the power of their length that is the number of stages.
+fn next_count(count: usize, excess: f64, stages: usize) -> Option<usize> {
+    if count == 0 {
+        return Some(1);
+    }
+    let predicted = count as f64 * excess.powf(1.0 / stages as f64);
+    // Written so that a NaN is beyond it.
+    let next =
+        if predicted <= MAX_PARTS as f64 { (predicted.ceil() as usize).next_power_of_two() } else { return None };
+    Some(next.max(2 * count)).filter(|next| *next <= MAX_PARTS)
 }
 
 impl<'p> Discretization<'p> {
-    /// The motion between the ends of a step that was not divided, with its conformal factor; `None` if the integrator is no
+    /// The motion between the ends of the last step of a stepper, which was not divided; `None` if the integrator is no
     /// collocation, if states within a step are to be computed by steps that end there, or if the motion is not resolved.
     pub fn resolve(
         &self,
         (from, to): (&(f64, State), &(f64, State)),
-        sigma: f64,
+        stepper: &dyn Stepper,
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
-        let stages = self.info.collocation.filter(|_| !self.needs.exact)?;
-        let mut count = FIRST_PARTS.iter().find(|(most, _)| stages <= *most)?.1;
-        let v = self.velocity(from.0, &from.1, near).ok()?;
-        let stages = (2 * stages + 1).min(MAX_STAGES);
+        let own = self.info.collocation.filter(|_| !self.needs.exact)?;
+        // An action that is not requested, and does not act on the motion, keeps its value.
+        let with_action = self.needs.action || to.1.z != from.1.z;
+        let (stages, length) = ((2 * own + 1).min(MAX_STAGES), to.0 - from.0);
+        // In transformed time its curve is no polynomial in t.
+        let tries_own = own >= MIN_STAGES && !self.info.in_transformed_time;
+        let mut found = if tries_own { Parts::whole(stepper, with_action) } else { None };
+        // With the most stages the step itself is the first part.
+        let mut count = usize::from(tries_own && own == MAX_STAGES);
+        let mut v = None;
         loop {
-            let found = self.in_parts((stages, count), (from, to), &v, sigma);
-            if found.is_some() || count >= MAX_PARTS {
-                return found;
+            let excess = found.as_ref().map_or(f64::INFINITY, |parts| self.excess(parts, &to.1, with_action));
+            if let Some(parts) = found.filter(|_| excess <= 1.0) {
+                let of_log_factor = stepper.sigma().ln() - parts.log_factors.last()?;
+                let (difference, order) = (parts.difference(&to.1), self.info.order as i32);
+                return Some(ResolvedStep { parts, t: from.0, length, difference, of_log_factor, order });
             }
-            count *= 2;
+            count = next_count(count, excess, stages)?;
+            if v.is_none() {
+                v = Some(self.velocity(from.0, &from.1, near).ok()?);
+            }
+            found = Some(self.in_parts((stages, count), from, v.as_ref()?, length, with_action)?);
         }
     }
 
-    /// The motion by a number of stages in a number of parts, if they resolve it.
+    /// The motion from a state by a number of stages in a number of equal parts.
     fn in_parts(
         &self,
         (stages, count): (usize, usize),
-        (from, to): (&(f64, State), &(f64, State)),
+        from: &(f64, State),
         v: &Vector,
-        sigma: f64,
-    ) -> Option<ResolvedStep> {
-        let (length, start) = (to.0 - from.0, (from.0, &from.1));
-        let is_equal = (length - self.h).abs() <= 4.0 * f64::EPSILON * (from.0.abs() + to.0.abs());
-        // The double-double tables of the separable route depend on the step size: they are computed once for equal steps.
+        length: f64,
+        with_action: bool,
+    ) -> Option<Parts> {
+        let is_equal = (length - self.h).abs() <= 4.0 * f64::EPSILON * (from.0.abs() + length.abs());
+        // The tables and the matrix of the separable route depend on the step size: they are computed once for equal steps.
         let claimed = self.problem.structure;
         let quadratic = claimed.quadratic && is_equal && self.pays_for_a_matrix(stages);
         let structure = Structure { quadratic, separable: claimed.separable && is_equal, ..claimed };
+        let h = if is_equal { self.h } else { length } / count as f64;
         let mut kept = self.of_parts.take();
-        let of_count = kept.iter().position(|(parts, _)| *parts == count && is_equal).map(|i| kept.swap_remove(i));
-        let kept_stepper = of_count
-            .and_then(|(_, mut stepper)| stepper.run_support_mut()?.restart(from.0, &from.1, v).then_some(stepper));
-        let mut stepper = match kept_stepper {
+        let place = kept.iter().position(|(parts, _)| *parts == count).filter(|_| is_equal);
+        let restarted = |mut stepper: Box<dyn Stepper + 'p>| {
+            stepper.run_support_mut()?.restart(from.0, &from.1, v).then_some(stepper)
+        };
+        let mut stepper = match place.and_then(|place| restarted(kept.swap_remove(place).1)) {
             Some(stepper) => stepper,
             None => {
-                let h = if is_equal { self.h } else { length } / count as f64;
-                let options = StepperOptions { undivided: true, ..self.options(false) };
-                let problem = self.problem_at(start, v, structure);
-                self.integrator.stepper_with_stages(&problem, stages, h, options).ok()??
+                let options = StepperOptions { undivided: true, stages: Some(stages), ..self.options(false) };
+                self.integrator.stepper(&self.problem_at((from.0, &from.1), v, structure), h, options).ok()?
             }
         };
-        let (mut parts, mut log_factors, mut log_factor) = (Vec::with_capacity(count), Vec::with_capacity(count), 0.0);
-        for _ in 0..count {
-            stepper.advance(1).ok()?;
-            parts.push(stepper.dense()?);
-            log_factors.push(log_factor);
-            log_factor += stepper.sigma().ln();
-        }
-        let end = stepper.state();
+        let parts = Parts::of_steps(&mut *stepper, count, with_action);
         if is_equal {
             kept.push((count, stepper));
         }
         self.of_parts.replace(kept);
-        let difference = State { q: &to.1.q - &end.q, p: &to.1.p - &end.p, z: to.1.z - end.z };
-        let [q, p, z] = [difference.q.amax(), difference.p.amax(), difference.z.abs()].map(|d| MAX_SHARE * d);
+        parts
+    }
+
+    /// The largest error of the parts, in units of the largest one that is accepted.
+    fn excess(&self, parts: &Parts, to: &State, with_action: bool) -> f64 {
+        let State { q, p, z } = parts.difference(to);
+        let of_step = [q.amax(), p.amax(), z.abs()].map(|error| MAX_SHARE * error);
         let tolerance = max_or_nan(ROUND_OFF, MAX_SHARE_OF_RUN * self.error.unwrap_or(0.0));
-        let follows_z = self.needs.action || to.1.z != from.1.z;
-        let is_resolved = parts.iter().all(|part| {
-            let errors = part.truncation_errors();
-            let bounds = [q, p, if follows_z { z } else { f64::INFINITY }];
-            // Written so that a NaN is not resolved.
-            errors.iter().zip(bounds).all(|([error, size], bound)| *error <= max_or_nan(bound, tolerance * size))
-        });
-        if !is_resolved {
-            return None;
-        }
-        let of_log_factor = sigma.ln() - log_factor;
-        Some(ResolvedStep {
-            from: from.0,
-            length,
-            parts,
-            log_factors,
-            difference,
-            of_log_factor,
-            order: self.info.order as i32,
+        let quantities = if with_action { 3 } else { 2 };
+        parts.curves.iter().fold(0.0, |most, curve| {
+            let errors = curve.truncation_errors();
+            errors.iter().zip(of_step).take(quantities).fold(most, |most, ([error, size], of_step)| {
+                if *error == 0.0 { most } else { max_or_nan(most, error / max_or_nan(of_step, tolerance * size)) }
+            })
         })
     }
 }
@@ -200,6 +240,21 @@ mod tests {
     fn states_within_a_step_are_as_accurate_as_at_its_end() {
         check(&OnLine::from(Pendulum { gamma: -0.1 }), "pendulum");
         check(&OnLine::from(QuadraticInZ::default()), "quadratic in z");
+    }
+
+    /// A time that is before the end of a step by its round-off has the state there, bitwise.
+    #[test]
+    fn a_time_next_to_the_end_of_a_step() {
+        let problem = Problem::new(&Pendulum { gamma: -0.1 }, 0.0, VelocityPoint::new([1.0], [0.7], 0.3)).unwrap();
+        let at = |t: f64| {
+            let mut rows = Rows::at([t]).unwrap();
+            let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(0.3)).observe(&mut rows);
+            run.run(Until::Time(3.0)).unwrap();
+            rows.rows.pop().unwrap().q[0]
+        };
+        let end: f64 = 7.0 * 0.3;
+        assert_eq!(at(end.next_down()), at(end));
+        assert_ne!(at(end - 1e-12), at(end));
     }
 
     /// A state between the ends of a step does not depend on the rows before it, bitwise, though the stepper of the parts is

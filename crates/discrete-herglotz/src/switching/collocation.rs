@@ -155,14 +155,4 @@ impl<'a> BoundIntegrator<'a> for ByPoints {
             None => Box::new(GaussStepper::by_points(problem, self.stages, h, options)?),
         })
     }
-
-    fn stepper_with_stages(
-        &self,
-        problem: &SystemProblem<'a>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        Ok(Some(Box::new(GaussStepper::by_points(problem, stages, h, options)?)))
-    }
 }

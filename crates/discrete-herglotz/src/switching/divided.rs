@@ -86,14 +86,4 @@ impl<'a, L: Lagrangian<N>, const N: usize> Integrator<'a, L, N> for DividedGauss
         }
         Ok(Box::new(self.run(Arc::new(CollocationOf(problem.lagrangian)), &problem.of_system(), h, options)?))
     }
-
-    fn stepper_with_stages(
-        &self,
-        problem: &Problem<'a, L, N>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        GaussCollocation { stages }.stepper(problem, h, options).map(Some)
-    }
 }

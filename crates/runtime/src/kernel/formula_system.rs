@@ -216,16 +216,6 @@ impl<'a, const N: usize> Integrator<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         each!(self, by => by.stepper(problem, h, options))
     }
-
-    fn stepper_with_stages(
-        &self,
-        problem: &Problem<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>,
-        stages: usize,
-        h: f64,
-        options: StepperOptions,
-    ) -> Result<Option<Box<dyn Stepper + 'a>>, InputError> {
-        each!(self, by => by.stepper_with_stages(problem, stages, h, options))
-    }
 }
 
 impl<const N: usize> FormulaSystem<N> for OfHamiltonian<FormulaHamiltonian<N>> {

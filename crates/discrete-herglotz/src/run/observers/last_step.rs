@@ -90,7 +90,7 @@ impl<'r> LastStep<'r> {
                 motion: self.motion,
                 stepper: self.stepper,
                 curve: Some(piece.dense.clone().map(Box::new)),
-                resolved: OnceCell::from(None),
+                resolved: OnceCell::new(),
                 rates: [None, None],
             };
             (piece.start, step)
@@ -135,8 +135,7 @@ impl<'r> LastStep<'r> {
         if t == self.from.0 {
             return Ok((self.from.1.clone(), 1.0));
         }
-        let is_part = self.origin.is_some() || self.next.is_some() || !self.stepper.pieces().is_empty();
-        if !is_part && (t - self.to.0).abs() <= TIME_ROUND_OFF * self.to.0.abs() {
+        if self.is_undivided() && (t - self.to.0).abs() <= TIME_ROUND_OFF * self.to.0.abs() {
             return Ok((self.to.1.clone(), self.stepper.sigma()));
         }
         let is_inside = (t - self.from.0) * (t - self.to.0) <= 0.0;
@@ -150,14 +149,17 @@ impl<'r> LastStep<'r> {
         self.motion.state_within_step(origin, t, self.stepper.last_velocity().as_ref(), curve)
     }
 
+    /// Whether it is the whole of a step that was not divided.
+    fn is_undivided(&self) -> bool {
+        self.stepper.pieces().is_empty()
+    }
+
     /// The motion between the ends, if polynomials resolve it.
     fn resolved(&self) -> Option<&ResolvedStep> {
         let LastStep { from, to, motion, stepper, .. } = self;
         let resolved = self.resolved.get_or_init(|| {
-            let is_divided = !stepper.pieces().is_empty();
-            let near = stepper.last_velocity();
-            let found = if is_divided { None } else { motion.resolve((from, to), stepper.sigma(), near.as_ref()) };
-            found.map(Box::new)
+            let found = || motion.resolve((from, to), *stepper, stepper.last_velocity().as_ref());
+            if self.is_undivided() { found().map(Box::new) } else { None }
         });
         resolved.as_deref()
     }
