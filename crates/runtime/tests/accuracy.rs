@@ -111,3 +111,35 @@ fn what_is_observed_does_not_change_the_motion() {
         }
     }
 }
+
+/// The iterations of a run with a requested error end at a small part of it, which costs fewer evaluations than round-off. The
+/// motion is that of the same steps up to this part.
+#[test]
+fn iterations_end_at_a_part_of_the_error() {
+    let pendulums = "x'^2 + y'^2/2 + cos(x - y)*x'*y' - 2*(1 - cos(x)) - (1 - cos(y)) - 0.1*z";
+    let oscillator = Formula::parse_hamiltonian("p_x^2/2 + x^4/4 + 0.05*z", &FormulaNames::new(&["x"], &[])).unwrap();
+    let of = |l: &str, coordinates: &[&str]| System::parse(l, coordinates, &[]).unwrap();
+    let of_hamiltonian = Start { velocity: InitialVelocity::Momentum(vec![0.5]), ..Start::new(0.0, [1.0], [0.5], 0.0) };
+    for (system, start, t_end) in [
+        (of("x'^2/2 + cos(x) - 0.01*z", &["x"]), Start::new(0.0, [1.0], [1.0], 0.0), 300.0),
+        (of("x'^2/2 - x^2/2 - 0.05*z^2", &["x"]), Start::new(0.0, [1.0], [0.0], 1.0), 100.0),
+        (of(pendulums, &["x", "y"]), Start::new(0.0, [0.9, 0.5], [0.0, 0.0], 0.0), 10.0),
+        (System::new(&oscillator).unwrap(), of_hamiltonian, 40.0),
+    ] {
+        let mut part = 1.0;
+        for error in [1e-9, 1e-6, 1e-3] {
+            let motion = Motion::new(start.clone(), t_end, accurate(error));
+            let (plan, ours) = (system.plan(&motion).unwrap(), system.run(&motion, &mut ()).unwrap());
+            let steps = StepControl::Steps { by: plan.by().unwrap(), steps: Steps::Count(plan.steps) };
+            let given = system.run(&Motion::new(start.clone(), t_end, steps), &mut ()).unwrap();
+            let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            let size = given.q.iter().chain(&given.p).map(|x| x.powi(2)).sum::<f64>();
+            let found = ((apart(&ours.q, &given.q) + apart(&ours.p, &given.p)) / size).sqrt();
+            assert!(found <= 0.01 * error, "{start:?}, {error:e}: {found:e}");
+            let now = ours.evaluations as f64 / given.evaluations as f64;
+            assert!(now < part, "{start:?}, {error:e}: {now} of the evaluations, {part} before");
+            part = now;
+        }
+        assert!(part <= 0.75, "{start:?}: {part} of the evaluations");
+    }
+}

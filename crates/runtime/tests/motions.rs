@@ -214,28 +214,40 @@ fn a_terminal_event_ends_the_rows_too() {
 
 #[test]
 fn an_interrupted_motion_goes_on_to_the_last_bit() {
-    goes_on(OutputTimes::Every(100), 100.0);
+    goes_on(&pendulum(), OutputTimes::Every(100), 100.0, by_steps(2000));
     // Rows at given times of the whole motion, one of which is the time of the interruption; forward and backward.
     let times = |end: f64| (0..=1000).map(move |k| if k == 1000 { end } else { end * f64::from(k) / 1000.0 }).collect();
-    goes_on(OutputTimes::At(times(100.0)), 100.0);
-    goes_on(OutputTimes::At(times(-100.0)), -100.0);
+    for end in [100.0, -100.0] {
+        goes_on(&pendulum(), OutputTimes::At(times(end)), end, by_steps(2000));
+        let slow = System::parse("x'^2/2 + cos(x) - 0.001*z", &["x"], &[]).unwrap();
+        goes_on(&slow, OutputTimes::At(times(30.0 * end)), 30.0 * end, accurate(1e-6));
+    }
 }
 
-fn goes_on(rows: OutputTimes, end: f64) {
-    let system = pendulum();
+fn goes_on(system: &System, rows: OutputTimes, end: f64, control: StepControl) {
     let motion = Motion {
         rows: Some(rows),
         columns: vec![Column::Time, Column::Position(0), Column::Action],
         resumable: true,
-        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), end, by_steps(2000))
+        ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), end, control)
     };
     let mut whole = Seen::default();
     let expected = system.run(&motion, &mut whole).unwrap();
-    let mut first = Seen { polls: Some(3), ..Seen::default() };
+    // A run to an accuracy has fewer steps.
+    let polls = if let StepControl::Accuracy { .. } = control { 1 } else { 3 };
+    let mut first = Seen { polls: Some(polls), ..Seen::default() };
     let ended = system.run(&motion, &mut first).unwrap();
-    assert!(matches!(ended.status, Status::Stopped { .. }) && ended.t.abs() < 100.0, "{ended:?}");
+    assert!(matches!(ended.status, Status::Stopped { .. }) && ended.t.abs() < end.abs(), "{ended:?}");
     let mut rest = Seen::default();
-    let outcome = system.resume(&motion, first.interrupted.unwrap(), &mut rest).unwrap();
+    let interrupted = first.interrupted.unwrap();
+    if let StepControl::Accuracy { .. } = control {
+        // The same steps, when given, are those of another run: its iterations end at round-off.
+        let plan = system.plan(&motion).unwrap();
+        let steps = StepControl::Steps { by: plan.by().unwrap(), steps: Steps::Count(plan.steps) };
+        let given = Motion { step_control: steps, ..motion.clone() };
+        assert!(system.resume(&given, interrupted.clone(), &mut Seen::default()).is_err());
+    }
+    let outcome = system.resume(&motion, interrupted, &mut rest).unwrap();
     assert_eq!(outcome, expected);
     let rows: Vec<_> = first.rows.into_iter().chain(rest.rows).collect();
     assert_eq!(rows, whole.rows);

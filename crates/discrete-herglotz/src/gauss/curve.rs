@@ -17,6 +17,8 @@ use crate::integration::StageVectors;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
 use crate::numbers::registers::{Stages, blocks};
+use between::MAX_STAGES_OF_TWO;
+pub(crate) use between::PointSets;
 use contact_geom::Scalar;
 use pulp::{Simd, WithSimd};
 pub(crate) use sample::SampleKernel;
@@ -35,9 +37,15 @@ impl dyn CollocationSystem + '_ {
         transformed: bool,
         sets: usize,
     ) -> Option<DefectSample> {
-        let at = |set| self.sample_defect(arch, curve, transformed, set);
-        let between = (0..sets).map(at).reduce(DefectSample::and)?;
-        Some(if self.has_cones() { between.with_ends(at(ENDS)) } else { between })
+        let at = |sets| self.sample_defect(arch, curve, transformed, sets);
+        let mut between = (sets > 0).then(|| at(PointSets::One(0)))?;
+        let mut set = 1;
+        while set < sets {
+            let by_two = curve.s <= MAX_STAGES_OF_TWO && set + 1 < sets;
+            let (now, next) = if by_two { (PointSets::Two(set), set + 2) } else { (PointSets::One(set), set + 1) };
+            (between, set) = (between.and(at(now)), next);
+        }
+        Some(if self.has_cones() { between.with_ends(at(PointSets::One(ENDS))) } else { between })
     }
 }
 

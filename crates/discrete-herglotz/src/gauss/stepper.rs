@@ -24,13 +24,15 @@ use std::rc::Rc;
 /// A stepper of contact Gauss collocation.
 ///
 /// The stages are evaluated in SIMD lanes. Their initial guess is extrapolated from the step before, the fixed-point
-/// iteration runs to round-off, and the state is advanced by compensated sums. If the fixed-point iteration does not
+/// iteration runs to round-off, or to the [tolerance](StepperOptions::tolerance) that is requested, and the state is advanced by compensated sums. If the fixed-point iteration does not
 /// converge, simplified Newton iteration is used, with a Jacobian that is kept as long as the iteration converges fast;
 /// if that does not converge either, Newton's method is used, in the stage positions alone if the mass matrix and the
 /// rate are constant. The step fails if none of them converges.
 pub struct GaussStepper<'a> {
     system: Box<dyn CollocationSystem + 'a>,
     depends_on_action: bool,
+    /// Whether its iterations end at round-off.
+    to_round_off: bool,
     steps: GaussSteps,
 }
 
@@ -109,10 +111,12 @@ impl<'a> GaussStepper<'a> {
         h: f64,
         options: StepperOptions,
     ) -> Result<Self, InputError> {
-        let (route, mass, of_sigma) = route_of(&*system, start, stages, h, options.action)?;
+        let (mut route, mass, of_sigma) = route_of(&*system, start, stages, h, options.action)?;
+        route.set_tolerance(options.tolerance);
         let (t0, q, v, check_resolution) = (start.t, start.q, start.v, options.check_resolution);
         let steps = GaussSteps::new(Setup { s: stages, h, t0, route, mass, of_sigma, q, v, check_resolution });
-        Ok(GaussStepper { system, depends_on_action: start.depends_on_action, steps })
+        let to_round_off = options.tolerance == 0.0;
+        Ok(GaussStepper { system, depends_on_action: start.depends_on_action, to_round_off, steps })
     }
 
     /// Without Newton's method: a step whose fixed-point iteration does not converge fails with
@@ -230,7 +234,7 @@ impl RunSupport for GaussStepper<'_> {
     }
 
     fn work_summary(&self) -> Vec<PlanEntry> {
-        work_summary(self.route(), self.depends_on_action)
+        work_summary(self.route(), self.depends_on_action, self.to_round_off)
     }
 
     fn guess(&mut self, longer: &DenseStep) {

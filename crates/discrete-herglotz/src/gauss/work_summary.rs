@@ -37,8 +37,10 @@ fn action(drives: bool) -> PlanEntry {
     )
 }
 
-/// The summary for steps that are equal in physical time; `drives` states that the motion depends on the action.
-pub(crate) fn work_summary(route: GaussRoute, drives: bool) -> Vec<PlanEntry> {
+/// The summary for steps that are equal in physical time; `drives` states that the motion depends on the action, and
+/// `to_round_off` that the iteration does not end before.
+pub(crate) fn work_summary(route: GaussRoute, drives: bool, to_round_off: bool) -> Vec<PlanEntry> {
+    let iteration = |exact, within| PlanEntry::computed("iteration", if to_round_off { exact } else { within });
     let newton =
         PlanEntry::skipped("Newton's method", "used only in steps whose fixed-point iteration does not contract");
     let gradients = PlanEntry::skipped("Jacobian", "the fixed-point iteration needs only gradients");
@@ -49,7 +51,10 @@ pub(crate) fn work_summary(route: GaussRoute, drives: bool) -> Vec<PlanEntry> {
             PlanEntry::skipped("action z", DECOUPLED),
         ],
         GaussRoute::Condensed => vec![
-            PlanEntry::computed("iteration", "determines the accelerations of the stages to round-off"),
+            iteration(
+                "determines the accelerations of the stages to round-off",
+                "determines the accelerations of the stages to a small part of the requested error",
+            ),
             mass_matrix(true),
             PlanEntry::skipped("integrating factor", "gamma is constant: the values at the stages are computed once"),
             PlanEntry::skipped(
@@ -60,9 +65,10 @@ pub(crate) fn work_summary(route: GaussRoute, drives: bool) -> Vec<PlanEntry> {
             PlanEntry::skipped("action z", DECOUPLED),
         ],
         GaussRoute::Hamiltonian => vec![
-            PlanEntry::computed(
-                "iteration",
+            iteration(
                 "determines the positions, momenta, actions and integrating factors of the stages to round-off",
+                "determines the positions, momenta, actions and integrating factors of the stages to a small part of the \
+                 requested error",
             ),
             PlanEntry::skipped("mass matrix", "the steps evaluate the Hamiltonian, whatever the rank of H_pp"),
             gradients,
@@ -70,9 +76,10 @@ pub(crate) fn work_summary(route: GaussRoute, drives: bool) -> Vec<PlanEntry> {
             action(drives),
         ],
         GaussRoute::ConstantMass | GaussRoute::General => vec![
-            PlanEntry::computed(
-                "iteration",
+            iteration(
                 "determines the velocities, actions and integrating factors of the stages to round-off",
+                "determines the velocities, actions and integrating factors of the stages to a small part of the \
+                 requested error",
             ),
             mass_matrix(route == GaussRoute::ConstantMass),
             gradients,

@@ -65,7 +65,7 @@ impl MethodInfo {
 }
 
 /// The options of a stepper.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepperOptions {
     /// Whether the action is computed even where it does not act back on the motion.
     pub action: bool,
@@ -82,6 +82,9 @@ pub struct StepperOptions {
     /// In place of the steps of a [collocation](MethodInfo::collocation) method those of contact Gauss collocation with
     /// this number of stages, in physical time, for the states between the ends of a step.
     pub stages: Option<usize>,
+    /// The largest relative error of the solution of the stage equations at which the iteration of a step of contact Gauss
+    /// collocation ends; 0, the default, for round-off.
+    pub tolerance: f64,
 }
 
 /// An integrator for Lagrangians L in N coordinates: the rules, splittings, compositions and collocation methods of

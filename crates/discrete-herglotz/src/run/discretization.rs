@@ -37,6 +37,8 @@ pub(crate) struct Discretization<'p> {
     pub count: usize,
     /// The error found by the trial runs, if an accuracy was requested.
     pub error: Option<f64>,
+    /// The relative error of the stages at which the iterations of collocation steps end; 0 for round-off.
+    tolerance: f64,
     pub integrator: SharedIntegrator<'p>,
     pub info: MethodInfo,
     pub needs: OutputRequest,
@@ -56,7 +58,7 @@ impl<'p> Discretization<'p> {
     /// The problem of a request with the selected steps.
     pub fn new(request: &Request<'p>, selection: &StepSelection<'p>) -> Result<Self, InputError> {
         let Request { problem, t_end, needs, scales, parts, .. } = request.clone();
-        let (integrator, &StepSelection { count, h, error, .. }) = (selection.integrator.clone(), selection);
+        let (integrator, &StepSelection { count, h, error, tolerance, .. }) = (selection.integrator.clone(), selection);
         let switches = has_switching_functions(&*problem.system, problem.t0, &problem.start)?;
         let info = integrator.info();
         if switches && info.in_transformed_time {
@@ -73,6 +75,7 @@ impl<'p> Discretization<'p> {
             h,
             count,
             error,
+            tolerance,
             integrator,
             info,
             needs,
@@ -120,7 +123,8 @@ impl<'p> Discretization<'p> {
 
     pub(super) fn options(&self, check_resolution: bool) -> StepperOptions {
         let OutputRequest { action, derivatives, .. } = self.needs;
-        StepperOptions { action, check_resolution, parts: derivatives, ..StepperOptions::default() }
+        let tolerance = self.tolerance;
+        StepperOptions { action, check_resolution, parts: derivatives, tolerance, ..StepperOptions::default() }
     }
 
     /// A stepper that starts at a state with its velocity and has taken steps of size h: a given number of them, or
@@ -304,7 +308,8 @@ impl Motion for Discretization<'_> {
         let name = self.info.name.bytes().map(u64::from);
         let OutputRequest { action, conformal_factor, .. } = self.needs;
         let counts = [n as u64, self.count as u64, action.into(), conformal_factor.into()];
-        digest(&numbers.chain(name).chain(counts).collect::<Vec<u64>>())
+        let tolerance = (self.tolerance > 0.0).then(|| self.tolerance.to_bits());
+        digest(&numbers.chain(name).chain(counts).chain(tolerance).collect::<Vec<u64>>())
     }
 
     fn state_within_step(

@@ -66,6 +66,8 @@ pub(crate) struct StepSelection<'p> {
     pub h: f64,
     /// The error that the trial runs found or predict; `None` for given steps.
     pub error: Option<f64>,
+    /// The relative error of the stages at which the iterations of collocation steps end; 0 for round-off.
+    pub tolerance: f64,
     /// The number of steps after which an observer is expected to end the run, if the steps fill a longer span.
     pub ended: Option<usize>,
     /// The stepper of a trial run with these steps, at the end of the span.
@@ -75,7 +77,7 @@ pub(crate) struct StepSelection<'p> {
 impl<'p> StepSelection<'p> {
     /// These steps over the whole span.
     pub fn new(integrator: SharedIntegrator<'p>, count: usize, h: f64, error: Option<f64>) -> Self {
-        StepSelection { integrator, count, h, error, ended: None, end: None }
+        StepSelection { integrator, count, h, error, tolerance: 0.0, ended: None, end: None }
     }
 }
 

@@ -4,6 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::curve::Curve;
+use crate::gauss::curve::between::PointSets;
 use crate::gauss::curve::sample::Sample;
 use crate::gauss::resolution::defect_sample::{DefectSample, beyond_rounding, tail, weighted};
 use crate::gauss::tables::coefficients::Coefficients;
@@ -20,7 +21,7 @@ pub(super) struct Compare<'a> {
     pub transformed: bool,
     /// Whether the Lagrangian is given by a contact Hamiltonian.
     pub hamiltonian: bool,
-    pub set: usize,
+    pub sets: PointSets,
 }
 
 impl WithSimd for Compare<'_> {
@@ -28,13 +29,13 @@ impl WithSimd for Compare<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> DefectSample {
-        let Compare { curve, sample, transformed, hamiltonian, set } = self;
+        let Compare { curve, sample, transformed, hamiltonian, sets } = self;
         let Curve { s, h, .. } = *curve;
         let (n, zero) = (curve.q.len(), Lanes::<S>::splat(0.0));
         let (mut of_value, mut kinetic, mut largest_l) = (zero, zero, zero);
         let (mut defect, mut size, mut of_z, mut size_z, mut all) = (zero, zero, zero, zero, zero);
         let (mut of_v, mut size_v) = (zero, zero);
-        for r in 0..blocks::<S>(s) {
+        for r in 0..blocks::<S>(sample.between.count) {
             // The factors from transformed time to t.
             let (mut slower, mut long) = (Lanes::<S>::splat(1.0), Lanes::<S>::splat(h));
             if transformed {
@@ -113,7 +114,7 @@ impl WithSimd for Compare<'_> {
         let defect = relative(of_momenta, size) + relative(of_action, size_z);
         let of_value = beyond_rounding(of_value.reduce_max(), largest_l.reduce_max());
         // The coefficients do not depend on the sample points; set 0 alone returns the estimate from them.
-        if set > 0 {
+        if sets != PointSets::One(0) {
             return DefectSample { defect, of_momenta, of_action, of_value, ..DefectSample::default() };
         }
         let mut fastest = 0.0;

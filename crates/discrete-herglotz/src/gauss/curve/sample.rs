@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::curve::Curve;
-use crate::gauss::curve::between::Between;
+use crate::gauss::curve::between::{Between, PointSets};
 use crate::gauss::curve::comparison::Compare;
 use crate::gauss::resolution::defect_sample::DefectSample;
 use crate::gauss::system::{ByPoints, Coordinates, InRegisters, Typed, add_force, few_coordinates, zeros};
@@ -23,37 +23,37 @@ use pulp::{Simd, WithSimd};
 
 /// The part of a defect sample that evaluates L.
 pub(crate) trait SampleKernel {
-    /// The defect of a curve, in transformed time if `transformed`, at a set of sample points.
-    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample;
+    /// The defect of a curve, in transformed time if `transformed`, at sets of sample points.
+    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, sets: PointSets) -> DefectSample;
 }
 
 impl<L: Lagrangian<N>, const N: usize> SampleKernel for Typed<'_, L, N> {
-    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
-        let mut sample = Sample::of(arch, curve, set);
+    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, sets: PointSets) -> DefectSample {
+        let mut sample = Sample::of(arch, curve, sets);
         arch.dispatch(Evaluate::<L, N> { lagrangian: self.0, transformed, curve, sample: &mut sample });
-        arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: L::HINTS.hamiltonian, set })
+        arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: L::HINTS.hamiltonian, sets })
     }
 }
 
 impl SampleKernel for ByPoints<'_> {
-    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
+    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, sets: PointSets) -> DefectSample {
         if let Some(kernels) = &self.kernels {
             // An infinite defect is that of values that are not finite.
             let undefined = || DefectSample { defect: f64::INFINITY, ..DefectSample::default() };
-            return caught(|| kernels.sample_defect(arch, curve, transformed, set), undefined);
+            return caught(|| kernels.sample_defect(arch, curve, transformed, sets), undefined);
         }
-        let mut sample = Sample::of(arch, curve, set);
+        let mut sample = Sample::of(arch, curve, sets);
         sample.evaluate(&*self.system, curve);
-        arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, set })
+        arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, sets })
     }
 }
 
 impl<F: ScalarSystem> SampleKernel for InRegisters<F> {
-    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, set: usize) -> DefectSample {
-        few_coordinates!(self, curve.q.len(), few => few.sample_defect(arch, curve, transformed, set), {
-            let mut sample = Sample::of(arch, curve, set);
+    fn sample_defect(&self, arch: Instructions, curve: &Curve, transformed: bool, sets: PointSets) -> DefectSample {
+        few_coordinates!(self, curve.q.len(), few => few.sample_defect(arch, curve, transformed, sets), {
+            let mut sample = Sample::of(arch, curve, sets);
             arch.dispatch(EvaluateInRegisters { system: &*self.0, curve, sample: &mut sample });
-            arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, set })
+            arch.dispatch(Compare { curve, sample: &sample, transformed, hamiltonian: false, sets })
         })
     }
 }
@@ -70,7 +70,7 @@ impl<F: ScalarSystem> WithSimd for EvaluateInRegisters<'_, F> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, _simd: S) {
-        let (mut r, m) = (0, blocks::<S>(self.curve.s));
+        let (mut r, m) = (0, blocks::<S>(self.sample.between.count));
         while r < m {
             r = if const { by_two::<S>() } && r + 1 < m {
                 self.take::<S, Two<S>>(r)
@@ -111,9 +111,9 @@ impl<F: ScalarSystem> EvaluateInRegisters<'_, F> {
     }
 }
 
-/// A curve at a set of sample points.
+/// A curve at sets of sample points.
 pub(super) struct Sample {
-    between: &'static Between,
+    pub between: &'static Between,
     /// The polynomials and their integrals: velocities, positions, forces, momenta `rho p`.
     pub v: StageVectors,
     pub q: StageVectors,
@@ -134,12 +134,12 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// The polynomials of a curve at a set of sample points. Inlined, since a sample is large: it is made in its place.
+    /// The polynomials of a curve at sets of sample points. Inlined, since a sample is large: it is made in its place.
     #[inline(always)]
-    fn of(arch: Instructions, curve: &Curve, set: usize) -> Self {
+    fn of(arch: Instructions, curve: &Curve, sets: PointSets) -> Self {
         let zero = || StageVectors::from_elem(Stages::ZERO, curve.q.len());
         let mut sample = Sample {
-            between: Between::of(curve.s, set),
+            between: Between::of(curve.s, sets),
             v: zero(),
             q: zero(),
             f: zero(),
@@ -162,14 +162,15 @@ impl Sample {
     fn evaluate(&mut self, system: &dyn System, curve: &Curve) {
         let Sample { between, v, q, z, value, force, momentum, slope, .. } = self;
         let forced = system.hints().forced;
-        for i in 0..curve.s {
+        for i in 0..between.count {
             let of = |stages: &[Stages]| stages.iter().map(|x| x.0[i]).collect();
             let (t, x) = (between.points.0[i] * curve.h + curve.t, Point { q: of(q), v: of(v), z: z.0[i] });
             let (l, mut g) = (system.value(t, &x), system.gradient(t, &x));
             if forced {
                 g.x += system.applied_force(t, &x);
             }
-            let set = |to: &mut Stages, x: f64| to.0[i..if i + 1 == curve.s { MAX_STAGES } else { i + 1 }].fill(x);
+            let set =
+                |to: &mut Stages, x: f64| to.0[i..if i + 1 == between.count { MAX_STAGES } else { i + 1 }].fill(x);
             set(value, l);
             set(slope, g.z);
             for d in 0..g.x.len() {
@@ -225,7 +226,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for Evaluate<'_, L, N> {
         let Sample { between, v, q, y, one_minus_rho, z, value, force, momentum, slope, dt_dtau, .. } = sample;
         let (Some(v), Some(q), Some(y)) = (v.first_chunk(), q.first_chunk(), y.first_chunk()) else { return };
         let (Some(force), Some(momentum)) = (force.first_chunk_mut(), momentum.first_chunk_mut()) else { return };
-        let (points, m) = (&between.points, blocks::<S>(curve.s));
+        let (points, m) = (&between.points, blocks::<S>(between.count));
         let mut at = AtPoints { lagrangian, curve, points, v, q, y, one_minus_rho, z, value, force, momentum, slope };
         let mut r = 0;
         while r < m {

@@ -48,6 +48,10 @@ pub(crate) trait StageRoute: Saved {
 
     fn state_mut(&mut self) -> RouteStateMut<'_>;
 
+    /// Ends the iterations of the following steps when the remaining error of the stages, relative to their terms, is at most
+    /// this. The default is no change: round-off.
+    fn set_tolerance(&mut self, _tolerance: f64) {}
+
     /// Takes one step from the time `t`; on failure the state is unchanged.
     fn step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome;
 

@@ -43,6 +43,8 @@ impl From<IterationOutcome> for StepError {
 pub(crate) struct FixedPointIteration {
     enough: f64,
     left: f64,
+    /// The remaining error, relative to the terms, at which the iteration may end; 0 for round-off.
+    tolerance: f64,
     count: u32,
     /// The change of the first iteration, and its largest term.
     first: (f64, f64),
@@ -67,6 +69,13 @@ impl FixedPointIteration {
     #[inline(always)]
     pub fn until(enough: f64, left: f64) -> Self {
         FixedPointIteration { enough, left, ..FixedPointIteration::default() }
+    }
+
+    /// The same, which also ends when the remaining error, by the last contraction factor, is at most `tolerance` times the
+    /// terms.
+    #[inline(always)]
+    pub fn with_tolerance(self, tolerance: f64) -> Self {
+        FixedPointIteration { tolerance, ..self }
     }
 
     pub fn count(&self) -> u32 {
@@ -118,7 +127,9 @@ impl FixedPointIteration {
             let ratio = change / self.before;
             let expected = f64::max(ratio, if self.count > 2 { self.ratio } else { 0.1 });
             let next = change * expected;
-            if next <= self.left * round_off {
+            // The changes that are left out add up as a geometric series.
+            let negligible = expected < 1.0 && next <= self.tolerance * size * (1.0 - expected);
+            if next <= self.left * round_off || negligible {
                 self.ends_with_secant = secant;
                 return IterationOutcome::Done;
             }
@@ -136,5 +147,31 @@ impl FixedPointIteration {
         }
         self.before = change;
         IterationOutcome::Continue
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The iteration of changes that decrease by a factor: the number of changes until it ends.
+    fn count(tolerance: f64, factor: f64) -> i32 {
+        let mut iteration = FixedPointIteration::until(1.0, 0.25).with_tolerance(tolerance);
+        (1..=MAX_ITERATIONS as i32).find(|k| iteration.assess(factor.powi(*k), 1.0) == IterationOutcome::Done).unwrap()
+    }
+
+    /// What remains after k changes is `factor^(k + 1) / (1 - factor)`. The iteration ends as soon as this is at most the
+    /// tolerance, and not before its factor is known from two changes.
+    #[test]
+    fn the_remaining_error_is_at_most_the_tolerance() {
+        for factor in [0.01_f64, 0.1, 0.3, 0.5] {
+            for tolerance in [1e-3, 1e-6, 1e-9, 1e-12] {
+                let remaining = |k: i32| factor.powi(k + 1) / (1.0 - factor);
+                let k = count(tolerance, factor);
+                assert!(remaining(k) <= tolerance * 1.0001, "{factor}, {tolerance:e}: {k}");
+                assert!(k == 2 || remaining(k - 1) > tolerance * 0.999 || factor < 0.1, "{factor}, {tolerance:e}: {k}");
+                assert!(k <= count(0.0, factor));
+            }
+        }
     }
 }

@@ -5,11 +5,13 @@ use crate::resolution::thresholds::MIN_COMPARED_DEFECT;
 use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::failure::cause_of_disagreement;
 use crate::run::accuracy::first_guess::first_guess;
+use crate::run::accuracy::last_digit::growth_of_distances;
 use crate::run::accuracy::limits::{
     ERROR_ORDER_OF_SMOOTH_MOTIONS, ERROR_ORDER_PER_DEFECT_ORDER, LONG_SEARCH_STEPS, MAX_DEFECT_ORDER,
     MAX_DISTANCE_OF_AGREEING_RUNS, MAX_DISTANCE_OF_ONE_TIME, MAX_FAILURES_AT_ONE_TIME, MAX_ITERATIONS, MAX_NARROW_RUNS,
-    MAX_NEWTON_RUNS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE, MAX_STAGNATIONS, MIN_DEFECT_ORDER,
-    MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, PREDICTION_RANGE, PREDICTION_REDUCTION, ROUND_OFF_OF_A_STEP,
+    MAX_NEWTON_RUNS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE, MAX_REGULAR_GROWTH, MAX_STAGNATIONS,
+    MIN_DEFECT_ORDER, MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, OF_ITERATIONS, PREDICTION_RANGE, PREDICTION_REDUCTION,
+    ROUND_OFF_OF_A_STEP,
 };
 use crate::run::accuracy::pair::Pairs;
 use crate::run::accuracy::track::Track;
@@ -32,13 +34,15 @@ pub(crate) struct Converged {
     /// order of the error.
     pub defect: f64,
     pub order: f64,
+    /// The tolerances of the iterations of both runs.
+    pub tolerances: [f64; 2],
     /// Whether the finer run costs less: its fixed-point iterations converge, where longer steps need Newton's
     /// method.
     pub finer_is_cheaper: bool,
     pub reference: Track,
     pub grid: ComparisonGrid,
-    /// Whether the search found a narrow feature, or defects that do not decrease like those of a smooth motion: the
-    /// errors of other numbers of steps cannot be predicted.
+    /// Whether the search found a narrow feature, defects that do not decrease like those of a smooth motion, or distances that
+    /// grow as in a chaotic motion: the errors of other numbers of steps cannot be predicted.
     pub irregular: bool,
 }
 
@@ -131,6 +135,9 @@ fn search(
         Compared::Tenths => ComparisonGrid::equal(k),
         Compared::Times => ComparisonGrid::Times,
     };
+    // Of motions that are known to be smooth the runs converge as their order says, whatever a small error of their steps.
+    let loose = smooth && matches!(compared, Compared::Steps) && !trials.request.needs.derivatives;
+    trials.of_iterations = if loose { OF_ITERATIONS * goal } else { 0.0 };
     let mut k = first_guess(trials.request, stages, goal_of_first);
     let first = k.max(LONG_SEARCH_STEPS / MIN_RATIO_FOR_DIVISION);
     let mut pairs = Pairs::of(smooth, k, stages, goal);
@@ -247,14 +254,18 @@ fn search(
         let order = if fall.is_nan() { s } else { fall.clamp(0.0, s) };
         // The error of the finer run: it has order 2s, whereas the defect has order s.
         let per_order = if smooth { ERROR_ORDER_OF_SMOOTH_MOTIONS } else { ERROR_ORDER_PER_DEFECT_ORDER };
-        let beyond = error / ratio.powf(per_order * order);
         let distances = coarse.distances(fine);
-        // Round-off does not decrease with the step size; along the motion it grows like the distance of the runs.
+        // Round-off does not decrease with the step size; along the motion it grows like the distance of the runs. The same
+        // holds for what iterations leave.
         let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
         let round_off = ROUND_OFF_OF_A_STEP * max_or_nan(growth, 1.0) * (k as f64).sqrt();
+        let of_iterations = if loose { fine.tolerance * finer as f64 * max_or_nan(growth, 1.0) } else { 0.0 };
+        let beyond = error / ratio.powf(per_order * order);
         let allowed = MAX_PREDICTED_ERROR * goal;
         let agreed = error <= MAX_DISTANCE_OF_AGREEING_RUNS * goal
-            || (error <= MAX_PREDICTIVE_DISTANCE && beyond <= allowed && round_off <= allowed);
+            || (error <= MAX_PREDICTIVE_DISTANCE
+                && beyond <= allowed
+                && max_or_nan(round_off, of_iterations) <= allowed);
         if falls && agreed && trials.samples_few_steps(stages * finer)? && !trials.keeps_energy(fine, &grid, finer) {
             (trials.samples_all_steps, next) = (true, None);
             continue;
@@ -269,14 +280,18 @@ fn search(
             return Ok(Converged {
                 k,
                 finer,
-                errors: [error, beyond],
+                errors: [error, beyond + of_iterations],
+                tolerances: [coarse.tolerance, fine.tolerance],
                 last_digit,
                 defect: coarse.defect,
                 order,
                 finer_is_cheaper: fine.cost < coarse.cost,
                 reference: fine.clone(),
                 grid,
-                irregular: irregular || narrow_features > 0 || fall > MAX_DEFECT_ORDER * s,
+                irregular: irregular
+                    || narrow_features > 0
+                    || fall > MAX_DEFECT_ORDER * s
+                    || growth_of_distances(&distances) > MAX_REGULAR_GROWTH,
             });
         }
         irregular |= !falls || disagreement.is_some();

@@ -9,25 +9,37 @@ use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::max_or_nan;
 use std::f64::consts::PI;
 
+/// The largest number of radians of a step in which the fixed-point iteration contracts, where the mass matrix varies.
+const MAX_RADIANS_OF_VARIABLE_MASS: f64 = 0.6;
+
+/// The largest product of a step with the rate at which a force damps the velocity at the start: as the motion slows down,
+/// such a rate decreases.
+const MAX_DAMPING: f64 = 2.0;
+
 /// The number of steps for which the motion linearised at its start has a given error. It is too small if nonlinear
 /// terms lead to higher frequencies.
 pub(crate) fn first_guess(request: &Request<'_>, stages: usize, goal: f64) -> usize {
-    let Request { problem: SystemProblem { system, start, t0, .. }, span, .. } = request;
+    let Request { problem, span, .. } = request;
+    let SystemProblem { system, start, t0, .. } = problem;
     if system.hints().hamiltonian {
         let frequency = frequency_of_hamiltonian(request);
         let count = span.abs() * frequency / radians(stages, goal).min(stages as f64 / 3.0).min(1.0);
         return if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 };
     }
-    let h = system.hessian(*t0, start);
+    let (h, force) = (system.hessian(*t0, start), system.force_derivatives(*t0, start));
     // The frequencies of forces that depend on the position, and of forces that rotate the velocity like a magnetic
-    // field.
-    let [of_position, turning] = inverse(&h.vv).map_or([0.0; 2], |inverse| {
-        let rotation = &h.qv - h.qv.transpose();
-        [spectral_radius(product(&inverse, &h.qq)).sqrt(), spectral_radius(product(&inverse, &rotation))]
+    // field, and the rate of those that damp it.
+    let [of_position, turning, damping] = inverse(&h.vv).map_or([0.0; 3], |inverse| {
+        let radius = |of: &DMatrix<f64>| spectral_radius(product(&inverse, of));
+        let damping = force.map_or(0.0, |force| radius(&force.v));
+        [radius(&h.qq).sqrt(), radius(&(&h.qv - h.qv.transpose())), damping]
     });
     let (s, radians) = (stages as f64, radians(stages, goal));
+    // Where the mass matrix varies along the motion, the fixed-point iteration contracts in shorter steps only.
+    let longest = if problem.structure.constant_mass { (s / 3.0).min(PI) } else { MAX_RADIANS_OF_VARIABLE_MASS };
     // The fixed-point iteration for the velocity contracts by the angle of its rotation in a step.
-    let count = span.abs() * max_or_nan(of_position / radians.min(s / 3.0).min(PI), turning / radians.min(1.0));
+    let of_velocity = max_or_nan(turning / radians.min(1.0), damping / radians.min(MAX_DAMPING));
+    let count = span.abs() * max_or_nan(of_position / radians.min(longest), of_velocity);
     // A motion that is free at its start may be fast later.
     if count.is_finite() { (count.ceil() as usize).clamp(1, MAX_FIRST_GUESS) } else { 1 }
 }

@@ -93,6 +93,24 @@ impl<'p> TrialRuns<'_, 'p> {
         Ok(nearest.map(|(_, distances)| distances))
     }
 
+    /// The same distances. Where they exceed `allowed`, they are not those that the iterations of the run have left.
+    fn distances_at_round_off(
+        &mut self,
+        of: &Track,
+        allowed: f64,
+        run: impl Fn(&mut TrialRuns<'_, 'p>) -> Result<TrialEnd, InputError>,
+    ) -> Result<Option<Vec<f64>>, InputError> {
+        let distances = self.distances_of_neighbour(of, allowed, &run)?;
+        let exceeds = distances.as_ref().is_some_and(|found| !found.iter().all(|distance| *distance <= allowed));
+        if of.tolerance > 0.0
+            && exceeds
+            && let TrialEnd::Completed(exact) = run(self)?
+        {
+            return self.distances_of_neighbour(&exact, allowed, run);
+        }
+        Ok(distances)
+    }
+
     /// The error that a change of the last digit of the start causes, where the distances of two runs that agree do not
     /// exclude that it matters; otherwise 0. `run` repeats the coarse one.
     ///
@@ -118,7 +136,7 @@ impl<'p> TrialRuns<'_, 'p> {
         let wanted = self.wanted;
         // Some units in the last place are no growth.
         let allowed = wanted.max(CERTAIN_ROUND_OFF);
-        let Some(distances) = self.distances_of_neighbour(coarse, allowed, run)? else { return Ok(0.0) };
+        let Some(distances) = self.distances_at_round_off(coarse, allowed, run)? else { return Ok(0.0) };
         let distance = max_abs_or_nan(distances.iter().copied());
         if distance <= allowed {
             return Ok(distance.min(wanted));
@@ -145,7 +163,7 @@ impl<'p> TrialRuns<'_, 'p> {
         let SelectionFailure::Chaos { .. } = cause else { return Ok(cause) };
         let roundings = ROUND_OFF_OF_A_STEP / f64::EPSILON * (steps as f64).sqrt();
         let allowed = self.wanted / roundings;
-        let distances = self.distances_of_neighbour(coarse, allowed, run)?;
+        let distances = self.distances_at_round_off(coarse, allowed, run)?;
         let grows = distances.is_none_or(|distances| !distances.iter().all(|d| *d <= allowed));
         Ok(if grows { cause } else { SelectionFailure::Order { order } })
     }

@@ -35,6 +35,13 @@ pub(crate) const MIN_OWN_REFERENCE_STAGES: usize = 6;
 /// The number of stages for short runs, and for Lagrangians whose steps are expensive.
 pub(crate) const DEFAULT_STAGES: usize = 8;
 
+/// The number of stages for short runs with a small error, if only the accelerations are iterated: with fewer stages the error
+/// would need steps that are far shorter than the iteration does.
+pub(crate) const STAGES_OF_SMALL_ERRORS: usize = 12;
+
+/// The largest error for which [`STAGES_OF_SMALL_ERRORS`] cost less than [`DEFAULT_STAGES`] for most motions.
+pub(crate) const SMALL_ERROR: f64 = 3e-9;
+
 /// The number of steps with [`DEFAULT_STAGES`] stages, estimated from the motion at its start, from which on the
 /// largest number of stages is the least expensive if only the accelerations are iterated: it halves the evaluations
 /// for an error, also in the trial runs, but its tables are four times as large.
@@ -91,9 +98,6 @@ pub(crate) const MIN_STEPS_OF_RATIO: usize = 24;
 /// The ratio of the numbers of steps of two runs if the error that is predicted for the coarser one is close to the goal.
 pub(crate) const NEAR_RATIO: [usize; 2] = [4, 3];
 
-/// The largest error that is close to the goal, in units of the distance of runs that agree.
-pub(crate) const MAX_ERROR_OF_NEAR_RUN: f64 = 100.0;
-
 /// The largest predicted error of the finer run, and the largest round-off, in units of the goal, at which both runs
 /// count as agreeing although their distance is larger: a tenth, since predictions may be wrong by this factor.
 pub(crate) const MAX_PREDICTED_ERROR: f64 = 0.1;
@@ -101,6 +105,10 @@ pub(crate) const MAX_PREDICTED_ERROR: f64 = 0.1;
 /// The round-off of a run with one step, relative to its size: some ten units in the last place, which grow with the
 /// square root of the number of steps.
 pub(crate) const ROUND_OFF_OF_A_STEP: f64 = 2e-15;
+
+/// The error that the iterations of the steps of a run may add, in units of the goal, if it does not grow along the motion:
+/// where it accumulates like the square of the time, it grows by a hundred from the first comparison on.
+pub(crate) const OF_ITERATIONS: f64 = 1e-4;
 
 /// The order with which the defect must at least decrease from one run to the next, below the order of every collocation
 /// method that is its own reference. At a jump the defect does not decrease.

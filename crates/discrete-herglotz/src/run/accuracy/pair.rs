@@ -6,8 +6,8 @@
 
 use crate::run::accuracy::comparison_grid::ComparisonGrid;
 use crate::run::accuracy::limits::{
-    ERROR_ORDER_PER_DEFECT_ORDER, MAX_DISTANCE_OF_AGREEING_RUNS, MAX_ERROR_OF_NEAR_RUN, MAX_PREDICTED_ERROR,
-    MAX_PREDICTIVE_DISTANCE, MIN_STEPS_OF_RATIO, NEAR_RATIO,
+    ERROR_ORDER_PER_DEFECT_ORDER, MAX_DISTANCE_OF_AGREEING_RUNS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE,
+    MIN_STEPS_OF_RATIO, NEAR_RATIO,
 };
 
 /// The number of steps of the first run, as a multiple of the base of the comparison grid; the runs beside it have
@@ -75,8 +75,10 @@ impl Pairs {
         if self.close && k == FIRST * grid.base() {
             return FINER * grid.base();
         }
-        let near = beyond <= MAX_ERROR_OF_NEAR_RUN * MAX_DISTANCE_OF_AGREEING_RUNS * self.goal;
         let [numerator, denominator] = NEAR_RATIO;
+        // The decrease of the error by the order of the method.
+        let decrease = (numerator as f64 / denominator as f64).powf(2.0 * self.s);
+        let near = beyond <= decrease * MAX_DISTANCE_OF_AGREEING_RUNS * self.goal;
         if self.close && near && (numerator * k).is_multiple_of(denominator * grid.base()) {
             numerator * k / denominator
         } else {

@@ -9,7 +9,7 @@ use crate::run::accuracy::first_guess::first_guess;
 use crate::run::accuracy::limits::{
     DEFAULT_STAGES, ERROR_ORDER_OF_LONGER_STEPS, MAX_DEFECT_OF_LONGER_STEPS, MAX_STAGES_PER_ORDER,
     MIN_OWN_REFERENCE_STAGES, MIN_PREDICTIVE_ERROR, MIN_STEP_FRACTION, MIN_STEPS_FOR_MAX_STAGES, PREDICTED_ERROR,
-    REFERENCE_ERROR, REFERENCE_STAGES, TARGET_ERROR, TRANSFORMED_STAGES,
+    REFERENCE_ERROR, REFERENCE_STAGES, SMALL_ERROR, STAGES_OF_SMALL_ERRORS, TARGET_ERROR, TRANSFORMED_STAGES,
 };
 use crate::run::accuracy::reference::by_reference;
 use crate::run::accuracy::trial_end::SwitchReason;
@@ -23,12 +23,14 @@ use contact_geom::numbers::max_or_nan;
 /// The number of stages of Gauss collocation if no integrator is given: for few steps the tables of many stages are
 /// expensive, for many steps of few stages the number of steps.
 fn stages_along(request: &Request<'_>, wanted: f64) -> usize {
-    let condensed = request.iterates_accelerations();
     // In general steps the fixed-point iteration does not converge for the step sizes of the largest number of stages.
-    if condensed && first_guess(request, DEFAULT_STAGES, wanted) >= MIN_STEPS_FOR_MAX_STAGES {
-        MAX_STAGES
-    } else {
-        DEFAULT_STAGES
+    if !request.iterates_accelerations() {
+        return DEFAULT_STAGES;
+    }
+    match first_guess(request, DEFAULT_STAGES, wanted) {
+        steps if steps >= MIN_STEPS_FOR_MAX_STAGES => MAX_STAGES,
+        steps if steps > 1 && wanted <= SMALL_ERROR => STAGES_OF_SMALL_ERRORS,
+        _ => DEFAULT_STAGES,
     }
 }
 
@@ -172,7 +174,13 @@ fn by_equal_steps<'p>(
     let longer = trials.request.iterates_accelerations();
     let (count, error) = min_step_count(stages, wanted, &found, longer);
     let end = trials.take_completed(stages, count);
-    Ok(StepSelection { end, ..selected(trials, integrator, count, error, &found) })
+    // The tolerance of the same run, if it is one of these.
+    let tolerance = match count {
+        count if count == found.k => found.tolerances[0],
+        count if count == found.finer => found.tolerances[1],
+        count => trials.of_iterations / count as f64,
+    };
+    Ok(StepSelection { end, tolerance, ..selected(trials, integrator, count, error, &found) })
 }
 
 /// The same selection with steps of equal size in the transformed time of the Lagrangian.

@@ -45,6 +45,9 @@ pub(crate) struct TrialRuns<'t, 'p> {
     pub tests_uneven_steps: bool,
     /// Whether all steps are sampled, since the energy did not follow its law.
     pub samples_all_steps: bool,
+    /// The error that the iterations of the steps of a run may add, in units of the size of the motion; 0 if they end at
+    /// round-off.
+    pub of_iterations: f64,
     /// The steppers of the last two completed runs of Gauss collocation, with their numbers of stages and of steps.
     pub completed: Vec<CompletedRun<'p>>,
 }
@@ -71,6 +74,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             ends_at_newton_steps: false,
             tests_uneven_steps,
             samples_all_steps: false,
+            of_iterations: 0.0,
             completed: Vec::new(),
         }
     }
@@ -129,7 +133,9 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         let samples_few = self.samples_few_steps(nodes)?;
         let for_energy = samples_few && !problem.structure.z_free;
         let action = for_energy || self.request.may_be_a_trial_run() && self.request.needs.action;
-        let (options, collocation) = (StepperOptions { action, ..StepperOptions::default() }, self.collocation.clone());
+        let tolerance = self.of_iterations / count as f64;
+        let (options, collocation) =
+            (StepperOptions { action, tolerance, ..StepperOptions::default() }, self.collocation.clone());
         if hints.switching_functions && has_switching_functions(&*problem.system, problem.t0, &problem.start)? {
             let make = move |problem: &SystemProblem<'p>, h: f64, _: bool| {
                 collocation.stepper(problem, stages, h, options).map(PartStepper::Collocation)
@@ -151,7 +157,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             false => (1, settings.points),
         };
         let settings = TrialSettings { points, ..settings };
-        let ending = self.run_with_samples(&mut *stepper, &settings, stride)?;
+        let ending = self.run_with_samples(&mut *stepper, &settings, stride)?.with_tolerance(tolerance);
         if let TrialEnd::Completed(_) = ending
             && self.request.may_be_a_trial_run()
         {
@@ -303,8 +309,9 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
                 break;
             }
             chunks += 1;
-            // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation.
-            let chunk = if stride == MAX_UNCHECKED_STEPS { stride.min(taken.max(1)) } else { stride };
+            // Few steps at first, so that the velocity is sampled at more than one phase of an oscillation; and a defect of
+            // the first step, which is the largest of a motion that decays.
+            let chunk = if stride == MAX_UNCHECKED_STEPS || taken == 0 { stride.min(taken.max(1)) } else { stride };
             let chunk = chunk.min(steps - taken);
             let advanced = match run.run_support_mut() {
                 Some(run) => run.advance_until(chunk, time),
@@ -346,8 +353,18 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
         let (speed, scales) = (speeds.speed(taken), scales.clone());
-        let track =
-            Track { states, actions, round_off, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
+        let track = Track {
+            states,
+            actions,
+            round_off,
+            velocities,
+            speed,
+            scales,
+            defect: 0.0,
+            cost: spent,
+            tolerance: 0.0,
+            tau: span,
+        };
         ending.unwrap_or(TrialEnd::Completed(track))
     }
 }

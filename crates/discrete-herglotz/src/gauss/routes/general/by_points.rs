@@ -71,7 +71,7 @@ impl<E: StageGradients + ?Sized> WithSimd for SolveStages<'_, E> {
         if !system.invert_mass::<S>(general, t) {
             return (IterationOutcome::NonFinite, FixedPointIteration::default());
         }
-        let General { newton, arch, evaluations, .. } = general;
+        let General { newton, arch, evaluations, tolerance, .. } = general;
         let n = general.q.len();
         let stages = StagesInMotion {
             system,
@@ -88,7 +88,7 @@ impl<E: StageGradients + ?Sized> WithSimd for SolveStages<'_, E> {
             p: &general.p,
             z: general.z.value,
         };
-        solve::<S, _>(stages, newton.as_deref_mut(), *arch, evaluations, t, given)
+        solve::<S, _>(stages, newton.as_deref_mut(), (*arch, *tolerance), evaluations, t, given)
     }
 }
 

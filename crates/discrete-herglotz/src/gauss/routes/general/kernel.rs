@@ -86,8 +86,8 @@ impl<L: Lagrangian<N>, const N: usize, const TRANSFORMED: bool> WithSimd for Sol
         if !invert_mass::<S, L, N>(general, lagrangian, t) {
             return (IterationOutcome::NonFinite, FixedPointIteration::default());
         }
-        let General { newton, arch, evaluations, .. } = general;
-        let (newton, arch) = (newton.as_deref_mut(), *arch);
+        let General { newton, arch, evaluations, tolerance, .. } = general;
+        let (newton, arch, tolerance) = (newton.as_deref_mut(), *arch, *tolerance);
         let stages = Iteration::<N, TRANSFORMED> {
             m: &general.m,
             table: &general.table,
@@ -104,7 +104,7 @@ impl<L: Lagrangian<N>, const N: usize, const TRANSFORMED: bool> WithSimd for Sol
             p: &general.p[..N],
             z: general.z.value,
         };
-        solve::<S, _>(OfLagrangian { lagrangian, stages }, newton, arch, evaluations, t, given)
+        solve::<S, _>(OfLagrangian { lagrangian, stages }, newton, (arch, tolerance), evaluations, t, given)
     }
 }
 
@@ -129,12 +129,12 @@ pub(crate) trait MovingStages {
 pub(crate) fn solve<S: Simd, M: MovingStages>(
     mut stages: M,
     mut newton: Option<&mut StageNewton>,
-    arch: Instructions,
+    (arch, tolerance): (Instructions, f64),
     evaluations: &mut u64,
     t: f64,
     given: GivenStages,
 ) -> (IterationOutcome, FixedPointIteration) {
-    let mut iteration = FixedPointIteration::until(1.0, 0.25);
+    let mut iteration = FixedPointIteration::until(1.0, 0.25).with_tolerance(tolerance);
     // The extrapolated L_v are not those of the extrapolated velocities. A small first change is then no sign
     // of convergence, and the convergence test starts again with the next iteration.
     let mut carried = given == GivenStages::WithGradients;
@@ -165,7 +165,9 @@ pub(crate) fn solve<S: Simd, M: MovingStages>(
         let change = if larger { of_transformed } else { change };
         match iteration.assess(change, 1.0) {
             IterationOutcome::Continue => {}
-            IterationOutcome::Done if carried => iteration = FixedPointIteration::until(1.0, 0.25),
+            IterationOutcome::Done if carried => {
+                iteration = FixedPointIteration::until(1.0, 0.25).with_tolerance(tolerance);
+            }
             outcome => return (outcome, iteration),
         }
         carried = false;

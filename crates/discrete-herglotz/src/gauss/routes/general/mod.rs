@@ -93,6 +93,8 @@ pub(crate) struct General {
     /// failed iteration overwrites the stages.
     known: Vec<f64>,
     pub evaluations: u64,
+    /// See [`set_tolerance`](crate::gauss::routes::StageRoute::set_tolerance).
+    tolerance: f64,
     /// The point at which the system is evaluated outside of the iteration.
     point: Point,
     /// Bounds of the round-off of the gradient there.
@@ -182,6 +184,7 @@ impl General {
             predicted: false,
             known: v.to_vec(),
             evaluations: 0,
+            tolerance: 0.0,
             point: Point { q: line(), v: v.to_vec(), p: line(), z: 0.0 },
             rounding: PointGradient::zeros(n),
             increments: Increments::zeros(n),

@@ -27,6 +27,10 @@ impl StageRoute for General {
         RouteStateMut { q: &mut self.q, y: &mut self.p, z: &mut self.z }
     }
 
+    fn set_tolerance(&mut self, tolerance: f64) {
+        self.tolerance = tolerance;
+    }
+
     fn step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome {
         self.take_step(system, system, t)
     }

@@ -68,7 +68,7 @@ impl<L: Lagrangian<N>, const N: usize> WithSimd for SolveStages<'_, L, N> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let SolveStages { lagrangian, t, start, stages } = self;
-        let mut iteration = FixedPointIteration::until(1.0, 0.25);
+        let mut iteration = FixedPointIteration::until(1.0, 0.25).with_tolerance(stages.tolerance);
         let HamiltonianStages { table, rows, newton, q, p, z, pp, least, evaluations, .. } = stages;
         let (Some(rows), Some(q), Some(p)) = (rows.for_dimension::<N>(), q.first_chunk(), p.first_chunk()) else {
             return (IterationOutcome::NonFinite, iteration);

@@ -76,6 +76,8 @@ pub(crate) struct HamiltonianStages {
     /// The velocity at the last stage of the last successful step, or at the start.
     known: Vec<f64>,
     evaluations: u64,
+    /// See [`set_tolerance`](crate::gauss::routes::StageRoute::set_tolerance).
+    tolerance: f64,
     increments: Increments,
     /// The stage at which H is evaluated outside of the iteration, and the workspace for it.
     stage: Stage,
@@ -108,6 +110,7 @@ impl HamiltonianStages {
             defect: 0.0,
             known: v.to_vec(),
             evaluations: 0,
+            tolerance: 0.0,
             increments: Increments::zeros(n),
             stage: Stage::zeros(n),
             evaluation: Evaluation::of(system),

@@ -122,6 +122,7 @@ impl<F: ForceSystem> WithSimd for Iterate<'_, F> {
             before,
             values,
             evaluations,
+            tolerance,
             ..
         } = run;
         let n = system.coordinates();
@@ -149,7 +150,8 @@ impl<F: ForceSystem> WithSimd for Iterate<'_, F> {
         let (mut small, mut again) = (at_once.then_some(weight), true);
         *far &= !tails;
         // With secant steps the changes decrease so fast that a smaller tolerance costs no further iteration.
-        let mut iteration = FixedPointIteration::until(1.0 / 16.0, if n == 1 { 1.0 / 256.0 } else { 1.0 / 64.0 });
+        let mut iteration = FixedPointIteration::until(1.0 / 16.0, if n == 1 { 1.0 / 256.0 } else { 1.0 / 64.0 })
+            .with_tolerance(*tolerance);
         let (outcome, change) = loop {
             if again {
                 begin::<S>(left, s, state, stages.rest, base, small);

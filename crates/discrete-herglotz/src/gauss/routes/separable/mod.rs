@@ -75,6 +75,8 @@ pub(crate) struct Separable {
     taken: usize,
     review: usize,
     evaluations: u64,
+    /// See [`set_tolerance`](crate::gauss::routes::StageRoute::set_tolerance).
+    tolerance: f64,
 }
 
 /// A point at which the derivatives or the round-off of the force are evaluated.
@@ -124,6 +126,7 @@ impl Separable {
             taken: 0,
             review: 1,
             evaluations: 0,
+            tolerance: 0.0,
         }
     }
 

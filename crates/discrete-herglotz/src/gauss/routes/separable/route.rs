@@ -28,6 +28,10 @@ impl StageRoute for Separable {
         RouteStateMut { q: &mut self.q, y: &mut self.v, z: &mut self.z }
     }
 
+    fn set_tolerance(&mut self, tolerance: f64) {
+        self.tolerance = tolerance;
+    }
+
     fn step(&mut self, system: &dyn CollocationSystem, t: f64) -> IterationOutcome {
         self.take_step(system, t)
     }
