@@ -9,9 +9,9 @@ use crate::run::accuracy::last_digit::growth_of_distances;
 use crate::run::accuracy::limits::{
     ERROR_ORDER_OF_SMOOTH_MOTIONS, ERROR_ORDER_PER_DEFECT_ORDER, LONG_SEARCH_STEPS, MAX_DEFECT_ORDER,
     MAX_DISTANCE_OF_AGREEING_RUNS, MAX_DISTANCE_OF_ONE_TIME, MAX_FAILURES_AT_ONE_TIME, MAX_ITERATIONS, MAX_NARROW_RUNS,
-    MAX_NEWTON_RUNS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE, MAX_REGULAR_GROWTH, MAX_STAGNATIONS,
-    MIN_DEFECT_ORDER, MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, OF_ITERATIONS, PREDICTION_RANGE, PREDICTION_REDUCTION,
-    ROUND_OFF_OF_A_STEP,
+    MAX_NEWTON_RUNS, MAX_OF_ITERATIONS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE, MAX_REGULAR_GROWTH,
+    MAX_STAGNATIONS, MIN_DEFECT_ORDER, MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, OF_ITERATIONS, PREDICTION_RANGE,
+    PREDICTION_REDUCTION, ROUND_OFF_OF_A_STEP,
 };
 use crate::run::accuracy::pair::Pairs;
 use crate::run::accuracy::track::Track;
@@ -260,12 +260,14 @@ fn search(
         let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
         let round_off = ROUND_OFF_OF_A_STEP * max_or_nan(growth, 1.0) * (k as f64).sqrt();
         let of_iterations = if loose { fine.tolerance * finer as f64 * max_or_nan(growth, 1.0) } else { 0.0 };
+        // What the iterations of both runs leave is a part of their distance.
+        let of_iterations = if of_iterations > error { error } else { of_iterations };
         let beyond = error / ratio.powf(per_order * order);
         let allowed = MAX_PREDICTED_ERROR * goal;
         let agreed = error <= MAX_DISTANCE_OF_AGREEING_RUNS * goal
             || (error <= MAX_PREDICTIVE_DISTANCE
-                && beyond <= allowed
-                && max_or_nan(round_off, of_iterations) <= allowed);
+                && max_or_nan(round_off, beyond) <= allowed
+                && of_iterations <= MAX_OF_ITERATIONS * goal);
         if falls && agreed && trials.samples_few_steps(stages * finer)? && !trials.keeps_energy(fine, &grid, finer) {
             (trials.samples_all_steps, next) = (true, None);
             continue;

@@ -110,6 +110,9 @@ pub(crate) const ROUND_OFF_OF_A_STEP: f64 = 2e-15;
 /// where it accumulates like the square of the time, it grows by a hundred from the first comparison on.
 pub(crate) const OF_ITERATIONS: f64 = 1e-4;
 
+/// The largest error that iterations may have left in a run, in units of the goal, at which its error is predicted.
+pub(crate) const MAX_OF_ITERATIONS: f64 = 0.5;
+
 /// The order with which the defect must at least decrease from one run to the next, below the order of every collocation
 /// method that is its own reference. At a jump the defect does not decrease.
 pub(crate) const MIN_DEFECT_ORDER: f64 = 3.0;
