@@ -10,8 +10,8 @@ use crate::run::accuracy::limits::{
     ERROR_ORDER_OF_SMOOTH_MOTIONS, ERROR_ORDER_PER_DEFECT_ORDER, LONG_SEARCH_STEPS, MAX_DEFECT_ORDER,
     MAX_DISTANCE_OF_AGREEING_RUNS, MAX_DISTANCE_OF_ONE_TIME, MAX_FAILURES_AT_ONE_TIME, MAX_ITERATIONS, MAX_NARROW_RUNS,
     MAX_NEWTON_RUNS, MAX_OF_ITERATIONS, MAX_PREDICTED_ERROR, MAX_PREDICTIVE_DISTANCE, MAX_REGULAR_GROWTH,
-    MAX_STAGNATIONS, MIN_DEFECT_ORDER, MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, OF_ITERATIONS, PREDICTION_RANGE,
-    PREDICTION_REDUCTION, ROUND_OFF_OF_A_STEP,
+    MAX_STAGNATIONS, MIN_ASYMPTOTIC_RATIO, MIN_DEFECT_ORDER, MIN_RATIO_FOR_DIVISION, NEGLIGIBLE_DEFECT, OF_ITERATIONS,
+    PREDICTION_RANGE, PREDICTION_REDUCTION, ROUND_OFF_OF_A_STEP,
 };
 use crate::run::accuracy::pair::Pairs;
 use crate::run::accuracy::track::Track;
@@ -253,7 +253,9 @@ fn search(
         let fall = (coarse.defect / fine.defect).log2() / ratio.log2();
         let order = if fall.is_nan() { s } else { fall.clamp(0.0, s) };
         // The error of the finer run: it has order 2s, whereas the defect has order s.
-        let per_order = if smooth { ERROR_ORDER_OF_SMOOTH_MOTIONS } else { ERROR_ORDER_PER_DEFECT_ORDER };
+        // Errors scatter about that order, by as much as they decrease from one of two runs that are near to the other.
+        let asymptotic = smooth && ratio >= MIN_ASYMPTOTIC_RATIO;
+        let per_order = if asymptotic { ERROR_ORDER_OF_SMOOTH_MOTIONS } else { ERROR_ORDER_PER_DEFECT_ORDER };
         let distances = coarse.distances(fine);
         // Round-off does not decrease with the step size; along the motion it grows like the distance of the runs. The same
         // holds for what iterations leave.

@@ -130,6 +130,9 @@ pub(crate) const ERROR_ORDER_PER_DEFECT_ORDER: f64 = 1.5;
 /// The same for motions that are known to be smooth: that of the theory.
 pub(crate) const ERROR_ORDER_OF_SMOOTH_MOTIONS: f64 = 2.0;
 
+/// The smallest ratio of the numbers of steps of two runs for which [`ERROR_ORDER_OF_SMOOTH_MOTIONS`] is used.
+pub(crate) const MIN_ASYMPTOTIC_RATIO: f64 = 1.5;
+
 /// The decrease of the defect, in units of the order, above which it is not due to the order: the finer steps end at a
 /// kink.
 pub(crate) const MAX_DEFECT_ORDER: f64 = 2.0;
