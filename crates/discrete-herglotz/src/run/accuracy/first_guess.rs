@@ -5,12 +5,16 @@ use crate::run::accuracy::limits::MAX_FIRST_GUESS;
 use crate::run::accuracy::matrices::{frobenius_norm, product};
 use crate::run::request::Request;
 use crate::system::mass_matrix::inverse;
+use crate::{Point, Vector};
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::numbers::max_or_nan;
 use std::f64::consts::PI;
 
 /// The largest number of radians of a step in which the fixed-point iteration contracts, where the mass matrix varies.
 const MAX_RADIANS_OF_VARIABLE_MASS: f64 = 0.6;
+
+/// The largest relative difference of two mass matrices that are equal.
+const MAX_CHANGE_OF_CONSTANT_MASS: f64 = 64.0 * f64::EPSILON;
 
 /// The largest product of a step with the rate at which a force damps the velocity at the start: as the motion slows down,
 /// such a rate decreases.
@@ -36,7 +40,15 @@ pub(crate) fn first_guess(request: &Request<'_>, stages: usize, goal: f64) -> us
     });
     let (s, radians) = (stages as f64, radians(stages, goal));
     // Where the mass matrix varies along the motion, the fixed-point iteration contracts in shorter steps only.
-    let longest = if problem.structure.constant_mass { (s / 3.0).min(PI) } else { MAX_RADIANS_OF_VARIABLE_MASS };
+    let varies = !problem.structure.constant_mass && {
+        // Differently for each coordinate, since it may depend on differences alone.
+        let moved = |x: &Vector| x.iter().enumerate().map(|(i, x)| x + 1.0 + 0.7 * i as f64).collect();
+        let moved = Point { q: moved(&start.q), v: moved(&start.v), z: start.z };
+        // Written so that a NaN varies.
+        let same = (system.mass_matrix(*t0, &moved) - &h.vv).amax() <= MAX_CHANGE_OF_CONSTANT_MASS * h.vv.amax();
+        !same
+    };
+    let longest = if varies { MAX_RADIANS_OF_VARIABLE_MASS } else { (s / 3.0).min(PI) };
     // The fixed-point iteration for the velocity contracts by the angle of its rotation in a step.
     let of_velocity = max_or_nan(turning / radians.min(1.0), damping / radians.min(MAX_DAMPING));
     let count = span.abs() * max_or_nan(of_position / radians.min(longest), of_velocity);
