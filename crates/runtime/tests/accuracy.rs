@@ -143,3 +143,33 @@ fn iterations_end_at_a_part_of_the_error() {
         assert!(part <= 0.75, "{start:?}: {part} of the evaluations");
     }
 }
+
+/// Motions of which searches have taken too few steps: one that decays, whose first steps have the largest defect, and one whose
+/// errors scatter about their order.
+#[test]
+fn errors_that_do_not_fall_evenly() {
+    let three = "0.777*x'^2/2 + 0.760*y'^2/2 + 1.484*w'^2/2 - (0.830*sqrt(1+x^2) + 0.952*y^2/2+0.463*exp(y) \
+        + 1.875*(1-cos(w)) + 0.187*(x-y)^2/2 + 0.270*cos(y-w))";
+    let of_three = Start::new(
+        0.0,
+        [0.6530006162239201, 0.6569429892441752, -0.8963112636236599],
+        [-1.1548264163390682, 0.0417032876735699, 0.7562844867100793],
+        0.0,
+    );
+    let decaying = "0.613*x'^2/2 - 0.658*sqrt(1+x^2) - 0.1306*z";
+    let of_decaying = Start::new(0.0, [-1.1412106848024368], [0.6404324724014796], 0.0);
+    for (l, coordinates, start, t_end, error, count) in [
+        (decaying, vec!["x"], of_decaying, 291.3058076679698, 1.28e-6, 600),
+        (three, vec!["x", "y", "w"], of_three, 341.6952031345293, 5.26e-10, 3200),
+    ] {
+        let system = System::parse(l, &coordinates, &[]).unwrap();
+        let steps = StepControl::Steps { by: "gauss_12".parse().unwrap(), steps: Steps::Count(count) };
+        let [found, exact] = [accurate(error), steps]
+            .map(|control| system.run(&Motion::new(start.clone(), t_end, control), &mut ()).unwrap());
+        let numbers = |of: &Outcome| of.q.iter().chain(&of.p).copied().collect::<Vec<f64>>();
+        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let (found, exact) = (numbers(&found), numbers(&exact));
+        let apart = norm(&found.iter().zip(&exact).map(|(a, b)| a - b).collect::<Vec<_>>());
+        assert!(apart <= error * norm(&exact), "{l}: {:e} of {error:e}", apart / norm(&exact));
+    }
+}

@@ -181,7 +181,13 @@ impl StageMap {
     /// `y = start + M x`.
     #[inline(always)]
     pub fn apply<S: Simd>(&self, x: &Stages, s: usize, y: &mut Stages, start: impl Terms<S>) {
-        over_groups!(S, blocks::<S>(s), r, K => {
+        self.apply_rows(x, s, s, y, start);
+    }
+
+    /// The same for another number of rows than of stages of x.
+    #[inline(always)]
+    pub fn apply_rows<S: Simd>(&self, x: &Stages, s: usize, rows: usize, y: &mut Stages, start: impl Terms<S>) {
+        over_groups!(S, blocks::<S>(rows), r, K => {
             let [sums] = self.rows::<S, K, 1>([x], s, [start.group(r)], r);
             y.set_group(r, sums);
         });

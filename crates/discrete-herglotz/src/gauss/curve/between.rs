@@ -5,7 +5,7 @@ use crate::gauss::resolution::defect_sample::SAMPLE_SETS;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES, lagrange_rows};
 use crate::numbers::array::from_fn;
 use crate::numbers::lanes::Lanes;
-use crate::numbers::registers::{StageMap, Stages, blocks, over_groups};
+use crate::numbers::registers::{StageMap, Stages, blocks};
 use pulp::Simd;
 use std::sync::OnceLock;
 
@@ -53,22 +53,16 @@ impl Between {
     /// The values of a polynomial at the sample points.
     #[inline(always)]
     pub fn value<S: Simd>(&self, s: usize, y: &Stages, out: &mut Stages) {
-        over_groups!(S, blocks::<S>(self.count), r, K => {
-            let [values] = self.value.rows::<S, K, 1>([y], s, [[Lanes::splat(0.0); K]], r);
-            out.set_group(r, values);
-        });
+        self.value.apply_rows(y, s, self.count, out, Lanes::<S>::splat(0.0));
     }
 
     /// The integral of a polynomial up to the sample points, plus the value at the start of the step.
     #[inline(always)]
     pub fn grown<S: Simd>(&self, s: usize, h: f64, y: &Stages, from: f64, out: &mut Stages) {
-        over_groups!(S, blocks::<S>(self.count), r, K => {
-            let [mut values] = self.integral.rows::<S, K, 1>([y], s, [[Lanes::splat(0.0); K]], r);
-            for value in &mut values {
-                *value = *value * h + from;
-            }
-            out.set_group(r, values);
-        });
+        self.integral.apply_rows(y, s, self.count, out, Lanes::<S>::splat(0.0));
+        for r in 0..blocks::<S>(self.count) {
+            out.set(r, out.block::<S>(r) * h + from);
+        }
     }
 
     fn new(s: usize, sets: PointSets) -> Self {
@@ -94,5 +88,32 @@ impl Between {
         let [value, integral] = lagrange_rows(s, &points);
         let [value, integral] = [value, integral].map(|rows| StageMap::new(&rows, count));
         Between { count, points: Stages(points), value, integral }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::{Scalar, Simd};
+
+    /// Two sets at once are one after the other: their points, and the values and integrals of a polynomial, bitwise.
+    #[test]
+    fn two_sets_are_one_after_the_other() {
+        fn values<S: Simd>(_: S, between: &Between, s: usize) -> [Stages; 3] {
+            let y = Stages(from_fn(|i| if i < s { 1.0 / (i as f64 + 0.7) } else { 0.0 }));
+            let (mut value, mut grown) = (Stages::ZERO, Stages::ZERO);
+            between.value::<S>(s, &y, &mut value);
+            between.grown::<S>(s, 0.3, &y, 0.1, &mut grown);
+            [between.points, value, grown]
+        }
+        for s in 1..=MAX_STAGES_OF_TWO {
+            for set in (1..SAMPLE_SETS - 1).step_by(2) {
+                let of = |sets| values(Scalar::new(), Between::of(s, sets), s);
+                let [first, second, both] = [PointSets::One(set), PointSets::One(set + 1), PointSets::Two(set)].map(of);
+                for ((first, second), both) in first.iter().zip(&second).zip(&both) {
+                    assert_eq!([&first.0[..s], &second.0[..s]].concat(), both.0[..2 * s], "{s}, {set}");
+                }
+            }
+        }
     }
 }

@@ -34,8 +34,6 @@ pub(crate) struct Converged {
     /// order of the error.
     pub defect: f64,
     pub order: f64,
-    /// The tolerances of the iterations of both runs.
-    pub tolerances: [f64; 2],
     /// Whether the finer run costs less: its fixed-point iterations converge, where longer steps need Newton's
     /// method.
     pub finer_is_cheaper: bool,
@@ -261,9 +259,8 @@ fn search(
         // holds for what iterations leave.
         let growth = distances.last().copied().unwrap_or(0.0) / distances.first().copied().unwrap_or(0.0);
         let round_off = ROUND_OFF_OF_A_STEP * max_or_nan(growth, 1.0) * (k as f64).sqrt();
-        let of_iterations = if loose { fine.tolerance * finer as f64 * max_or_nan(growth, 1.0) } else { 0.0 };
-        // What the iterations of both runs leave is a part of their distance.
-        let of_iterations = if of_iterations > error { error } else { of_iterations };
+        // What the iterations of both runs leave is also a part of their distance.
+        let of_iterations = if loose { (trials.of_iterations * max_or_nan(growth, 1.0)).min(error) } else { 0.0 };
         let beyond = error / ratio.powf(per_order * order);
         let allowed = MAX_PREDICTED_ERROR * goal;
         let agreed = error <= MAX_DISTANCE_OF_AGREEING_RUNS * goal
@@ -285,7 +282,6 @@ fn search(
                 k,
                 finer,
                 errors: [error, beyond + of_iterations],
-                tolerances: [coarse.tolerance, fine.tolerance],
                 last_digit,
                 defect: coarse.defect,
                 order,

@@ -102,7 +102,7 @@ impl<'p> TrialRuns<'_, 'p> {
     ) -> Result<Option<Vec<f64>>, InputError> {
         let distances = self.distances_of_neighbour(of, allowed, &run)?;
         let exceeds = distances.as_ref().is_some_and(|found| !found.iter().all(|distance| *distance <= allowed));
-        if of.tolerance > 0.0
+        if self.of_iterations > 0.0
             && exceeds
             && let TrialEnd::Completed(exact) = run(self)?
         {

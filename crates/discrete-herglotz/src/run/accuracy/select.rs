@@ -174,13 +174,7 @@ fn by_equal_steps<'p>(
     let longer = trials.request.iterates_accelerations();
     let (count, error) = min_step_count(stages, wanted, &found, longer);
     let end = trials.take_completed(stages, count);
-    // The tolerance of the same run, if it is one of these.
-    let tolerance = match count {
-        count if count == found.k => found.tolerances[0],
-        count if count == found.finer => found.tolerances[1],
-        count => trials.of_iterations / count as f64,
-    };
-    Ok(StepSelection { end, tolerance, ..selected(trials, integrator, count, error, &found) })
+    Ok(StepSelection { end, tolerance: trials.tolerance(count), ..selected(trials, integrator, count, error, &found) })
 }
 
 /// The same selection with steps of equal size in the transformed time of the Lagrangian.

@@ -28,8 +28,6 @@ pub(crate) struct Track {
     pub defect: f64,
     /// The cost without the defect samples, in evaluations of L at one stage.
     pub cost: u64,
-    /// The tolerance of the iterations of its steps; 0 for round-off.
-    pub tolerance: f64,
     /// The span in transformed time.
     pub tau: f64,
 }
@@ -72,7 +70,6 @@ impl Track {
             round_off: vec![0.0],
             defect: 0.0,
             cost: 0,
-            tolerance: 0.0,
             tau: 0.0,
         }
     }

@@ -45,11 +45,6 @@ impl TrialEnd {
         if let TrialEnd::Completed(track) = self { TrialEnd::Completed(Track { tau, ..track }) } else { self }
     }
 
-    /// The same, by iterations with a tolerance.
-    pub fn with_tolerance(self, tolerance: f64) -> Self {
-        if let TrialEnd::Completed(track) = self { TrialEnd::Completed(Track { tolerance, ..track }) } else { self }
-    }
-
     /// The end of a run whose first step failed, which leads to a refinement; invalid input ends the search.
     pub fn of_failed_start(error: InputError) -> Result<Self, InputError> {
         match error {

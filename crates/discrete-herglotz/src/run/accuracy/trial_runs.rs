@@ -45,8 +45,8 @@ pub(crate) struct TrialRuns<'t, 'p> {
     pub tests_uneven_steps: bool,
     /// Whether all steps are sampled, since the energy did not follow its law.
     pub samples_all_steps: bool,
-    /// The error that the iterations of the steps of a run may add, in units of the size of the motion; 0 if they end at
-    /// round-off.
+    /// The error that the iterations of the steps of a run may add by Gauss collocation, in units of the size of the motion; 0
+    /// if they end at round-off. It is the same for all runs of a search.
     pub of_iterations: f64,
     /// The steppers of the last two completed runs of Gauss collocation, with their numbers of stages and of steps.
     pub completed: Vec<CompletedRun<'p>>,
@@ -133,9 +133,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         let samples_few = self.samples_few_steps(nodes)?;
         let for_energy = samples_few && !problem.structure.z_free;
         let action = for_energy || self.request.may_be_a_trial_run() && self.request.needs.action;
-        let tolerance = self.of_iterations / count as f64;
-        let (options, collocation) =
-            (StepperOptions { action, tolerance, ..StepperOptions::default() }, self.collocation.clone());
+        let options = StepperOptions { action, tolerance: self.tolerance(count), ..StepperOptions::default() };
+        let collocation = self.collocation.clone();
         if hints.switching_functions && has_switching_functions(&*problem.system, problem.t0, &problem.start)? {
             let make = move |problem: &SystemProblem<'p>, h: f64, _: bool| {
                 collocation.stepper(problem, stages, h, options).map(PartStepper::Collocation)
@@ -157,7 +156,7 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
             false => (1, settings.points),
         };
         let settings = TrialSettings { points, ..settings };
-        let ending = self.run_with_samples(&mut *stepper, &settings, stride)?.with_tolerance(tolerance);
+        let ending = self.run_with_samples(&mut *stepper, &settings, stride)?;
         if let TrialEnd::Completed(_) = ending
             && self.request.may_be_a_trial_run()
         {
@@ -197,6 +196,11 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         // The integrator samples the defect of each step, which costs twice its stages.
         let cost = |run: &_, _: f64| (None, 2 * Stepper::evaluations(run));
         self.take_steps(&mut stepper, count, grid, 1, cost).unless_interrupted()
+    }
+
+    /// The tolerance of the iterations of each of `count` steps.
+    pub fn tolerance(&self, count: usize) -> f64 {
+        self.of_iterations / count as f64
     }
 
     /// The step size with which `count` steps fill the span; in transformed time, if the rate kept its value at the
@@ -353,18 +357,8 @@ impl<'t, 'p> TrialRuns<'t, 'p> {
         self.left = self.left.saturating_sub(spent);
         self.reserve = self.reserve.saturating_sub(spent);
         let (speed, scales) = (speeds.speed(taken), scales.clone());
-        let track = Track {
-            states,
-            actions,
-            round_off,
-            velocities,
-            speed,
-            scales,
-            defect: 0.0,
-            cost: spent,
-            tolerance: 0.0,
-            tau: span,
-        };
+        let track =
+            Track { states, actions, round_off, velocities, speed, scales, defect: 0.0, cost: spent, tau: span };
         ending.unwrap_or(TrialEnd::Completed(track))
     }
 }
