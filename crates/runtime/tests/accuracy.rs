@@ -19,6 +19,13 @@ fn run(system: &System, start: ([f64; 2], [f64; 2]), t_end: f64, control: StepCo
     outcome
 }
 
+/// The distance of (q, p) at the ends of two motions, relative to the size of the second.
+fn distance(of: &Outcome, from: &Outcome) -> f64 {
+    let pairs = of.q.iter().chain(&of.p).zip(from.q.iter().chain(&from.p));
+    let [apart, size] = pairs.fold([0.0; 2], |[apart, size], (a, b)| [apart + (a - b).powi(2), size + b * b]);
+    (apart / size).sqrt()
+}
+
 /// A motion in a plane along a line through the tip of a norm is that of `abs` along the line, whose kinks are known.
 #[test]
 fn a_motion_through_the_tip_of_a_norm() {
@@ -104,9 +111,7 @@ fn what_is_observed_does_not_change_the_motion() {
                 (all, of.steps, of.evaluations, of.status, of.unresolved)
             };
             assert_eq!(numbers(&end), numbers(&with_rows), "{start:?}, {error:e}");
-            let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-            let size = exact.q.iter().chain(&exact.p).map(|x| x.powi(2)).sum::<f64>();
-            let found = ((apart(&end.q, &exact.q) + apart(&end.p, &exact.p)) / size).sqrt();
+            let found = distance(&end, &exact);
             assert!(found <= error, "{start:?}, {error:e}: {found:e}");
         }
     }
@@ -132,9 +137,7 @@ fn iterations_end_at_a_part_of_the_error() {
             let (plan, ours) = (system.plan(&motion).unwrap(), system.run(&motion, &mut ()).unwrap());
             let steps = StepControl::Steps { by: plan.by().unwrap(), steps: Steps::Count(plan.steps) };
             let given = system.run(&Motion::new(start.clone(), t_end, steps), &mut ()).unwrap();
-            let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-            let size = given.q.iter().chain(&given.p).map(|x| x.powi(2)).sum::<f64>();
-            let found = ((apart(&ours.q, &given.q) + apart(&ours.p, &given.p)) / size).sqrt();
+            let found = distance(&ours, &given);
             assert!(found <= 0.01 * error, "{start:?}, {error:e}: {found:e}");
             let now = ours.evaluations as f64 / given.evaluations as f64;
             assert!(now < part, "{start:?}, {error:e}: {now} of the evaluations, {part} before");
@@ -166,10 +169,7 @@ fn errors_that_do_not_fall_evenly() {
         let steps = StepControl::Steps { by: "gauss_12".parse().unwrap(), steps: Steps::Count(count) };
         let [found, exact] = [accurate(error), steps]
             .map(|control| system.run(&Motion::new(start.clone(), t_end, control), &mut ()).unwrap());
-        let numbers = |of: &Outcome| of.q.iter().chain(&of.p).copied().collect::<Vec<f64>>();
-        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let (found, exact) = (numbers(&found), numbers(&exact));
-        let apart = norm(&found.iter().zip(&exact).map(|(a, b)| a - b).collect::<Vec<_>>());
-        assert!(apart <= error * norm(&exact), "{l}: {:e} of {error:e}", apart / norm(&exact));
+        let off = distance(&found, &exact);
+        assert!(off <= error, "{l}: {off:e} of {error:e}");
     }
 }
