@@ -1,6 +1,9 @@
 //! The lanes of a SIMD register as a scalar type over which a Lagrangian can be evaluated.
 
-use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
+use crate::numbers::functions::{
+    EXPONENT_RANGE, REDUCIBLE, Register, cosine, exponential, exponential_minus_one, hyperbolic_sine,
+    hyperbolic_tangent, logarithm, power, sine,
+};
 use contact_geom::{Scalar, scalar_operators};
 use pulp::{Simd, WithSimd, bytemuck};
 use std::cell::Cell;
@@ -101,10 +104,18 @@ impl<S: Simd> Lanes<S> {
         self
     }
 
-    /// Whether all lanes are within the range of the argument reduction.
+    /// Whether the absolute values of all lanes are below a bound.
     #[inline(always)]
-    fn reducible(self) -> bool {
-        self.abs().reduce_max() < REDUCIBLE
+    fn is_below(self, bound: f64) -> bool {
+        self.abs().reduce_max() < bound
+    }
+
+    /// Whether no lane is below or above the normal numbers of a sign.
+    #[inline(always)]
+    fn is_positive(self) -> bool {
+        let [zero, one] = [0.0, 1.0].map(Self::splat);
+        let outside = Self::splat(f64::MAX).where_less(self, one, zero);
+        self.where_less(Self::splat(f64::MIN_POSITIVE), one, outside).reduce_max() == 0.0
     }
 }
 
@@ -124,6 +135,18 @@ impl<S: Simd> Register for Lanes<S> {
         let set = token::<S>();
         let last = set.and_u64s(set.transmute_u64s_f64s(of.0), set.splat_u64s(1));
         Lanes(set.select_f64s(set.equal_u64s(last, set.splat_u64s(0)), self.0, (-self).0))
+    }
+    #[inline(always)]
+    fn where_less(self, b: Self, then: Self, otherwise: Self) -> Self {
+        let set = token::<S>();
+        Lanes(set.select_f64s(set.less_than_f64s(self.0, b.0), then.0, otherwise.0))
+    }
+    #[inline(always)]
+    fn map_digits(mut self, of: impl Fn(u64) -> u64) -> Self {
+        for digits in bytemuck::cast_slice_mut::<_, u64>(std::slice::from_mut(&mut self.0)) {
+            *digits = of(*digits);
+        }
+        self
     }
 }
 
@@ -218,17 +241,39 @@ impl<S: Simd> Scalar for Lanes<S> {
         }
         if n < 0 { power.recip() } else { power }
     }
+    #[inline(always)]
     fn powf(self, a: f64) -> Self {
-        self.each(|x| x.powf(a))
+        let [zero, one] = [0.0, 1.0].map(Self::splat);
+        // Powers of 0 are frequent, as of the depth of a contact.
+        let is_zero = Lanes::abs(self).where_less(Self::splat(f64::from_bits(1)), one, zero);
+        let [value, product] = power(self.where_less(Self::splat(f64::MIN_POSITIVE), one, self), a);
+        let is_usable = const { Self::FUSED } && a.fract() != 0.0 && product.is_below(EXPONENT_RANGE);
+        if !(is_usable && (self + is_zero).is_positive()) {
+            return self.each(|x| x.powf(a));
+        }
+        let at_zero = Self::splat(if a < 0.0 { f64::INFINITY } else { 0.0 });
+        zero.where_less(is_zero, at_zero, value)
     }
+    #[inline(always)]
     fn exp(self) -> Self {
-        self.each(f64::exp)
+        if !self.is_below(EXPONENT_RANGE) {
+            return self.each(f64::exp);
+        }
+        exponential(self, Self::splat(0.0))
     }
+    #[inline(always)]
     fn exp_m1(self) -> Self {
-        self.each(f64::exp_m1)
+        if !self.is_below(EXPONENT_RANGE) {
+            return self.each(f64::exp_m1);
+        }
+        exponential_minus_one(self)
     }
+    #[inline(always)]
     fn ln(self) -> Self {
-        self.each(f64::ln)
+        if !self.is_positive() {
+            return self.each(f64::ln);
+        }
+        logarithm(self)
     }
     fn ln_1p(self) -> Self {
         self.each(f64::ln_1p)
@@ -240,14 +285,14 @@ impl<S: Simd> Scalar for Lanes<S> {
     }
     #[inline(always)]
     fn sin(self) -> Self {
-        if !self.reducible() {
+        if !self.is_below(REDUCIBLE) {
             return self.each(f64::sin);
         }
         sine(self)
     }
     #[inline(always)]
     fn cos(self) -> Self {
-        if !self.reducible() {
+        if !self.is_below(REDUCIBLE) {
             return self.each(f64::cos);
         }
         cosine(self)
@@ -257,14 +302,24 @@ impl<S: Simd> Scalar for Lanes<S> {
         let half = Scalar::sin(self * 0.5);
         (Scalar::sin(self), half * half * 2.0)
     }
+    #[inline(always)]
     fn sinh(self) -> Self {
-        self.each(f64::sinh)
+        if !self.is_below(EXPONENT_RANGE) {
+            return self.each(f64::sinh);
+        }
+        hyperbolic_sine(self)
     }
+    #[inline(always)]
     fn cosh(self) -> Self {
-        self.each(f64::cosh)
+        if !self.is_below(EXPONENT_RANGE) {
+            return self.each(f64::cosh);
+        }
+        let e = exponential(self, Self::splat(0.0));
+        (e + Scalar::recip(e)) * 0.5
     }
+    #[inline(always)]
     fn tanh(self) -> Self {
-        self.each(f64::tanh)
+        hyperbolic_tangent(self)
     }
     fn atan(self) -> Self {
         self.each(f64::atan)
@@ -296,58 +351,6 @@ impl<S: Simd> Scalar for Lanes<S> {
 mod tests {
     use super::*;
     use contact_geom::nalgebra::SVector;
-
-    /// Evaluates sine and cosine of the arguments in SIMD lanes.
-    struct Evaluate<'a>(&'a [f64]);
-
-    impl WithSimd for Evaluate<'_> {
-        type Output = Vec<[f64; 3]>;
-
-        #[inline(always)]
-        fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
-            let mut out = Vec::new();
-            for x in self.0.chunks_exact(Lanes::<S>::COUNT) {
-                let (sin, cos) = Lanes::<S>(S::as_simd_f64s(x).0[0]).sin_cos();
-                out.extend((0..x.len()).map(|i| [x[i], sin.lanes()[i], cos.lanes()[i]]));
-            }
-            out
-        }
-    }
-
-    /// Sine and cosine agree with those of the standard library, which are accurate to half a unit in the last place,
-    /// to 2 units and `1e-33 |x|`, the error of pi in two parts. The arguments are random of all sizes, and neighbours
-    /// of multiples of pi/2. Beyond the range of the argument reduction the standard library is used.
-    #[test]
-    fn sines_are_those_of_one_number() {
-        let mut arguments = Vec::new();
-        let mut random = 0.5;
-        for k in 0..40_000 {
-            random = (random + 0.618_033_988_749_894_9f64).fract();
-            let size = 10f64.powi(k % 24 - 16);
-            arguments.push((2.0 * random - 1.0) * size);
-            // Multiples of pi/2 and their neighbours, where the reduced argument is smallest.
-            let multiple = f64::from(k * 8) * std::f64::consts::FRAC_PI_2;
-            arguments.extend([multiple, multiple.next_up(), -multiple, f64::from(k) * std::f64::consts::FRAC_PI_2]);
-        }
-        let mut sets =
-            vec![pulp::Scalar::new().vectorize(Evaluate(&arguments)), pulp::Arch::new().dispatch(Evaluate(&arguments))];
-        #[cfg(target_arch = "x86_64")]
-        {
-            sets.extend(pulp::x86::V3::try_new().map(|set| Simd::vectorize(set, Evaluate(&arguments))));
-            sets.extend(pulp::x86::V4::try_new().map(|set| Simd::vectorize(set, Evaluate(&arguments))));
-        }
-        let ulp = |b: f64| b.abs().next_up() - b.abs();
-        for set in sets {
-            assert_eq!(set.len(), arguments.len());
-            for [x, sin, cos] in set {
-                let (s, c) = x.sin_cos();
-                for (what, y, exact) in [("sin", sin, s), ("cos", cos, c)] {
-                    let within = (y - exact).abs() <= 2.0 * ulp(exact) + 1e-33 * x.abs();
-                    assert!(within, "{what} {x:e}: {y:e}, not {exact:e}");
-                }
-            }
-        }
-    }
 
     /// Evaluates [`choices`] for pairs of numbers in SIMD lanes.
     struct ChooseLanes<'a>(&'a [f64], &'a [f64]);

@@ -1,7 +1,10 @@
 //! Several SIMD registers as one scalar, with one trajectory per lane.
 
+use crate::numbers::functions::{
+    EXPONENT_RANGE, REDUCIBLE, Register, cosine, exponential, exponential_minus_one, hyperbolic_sine,
+    hyperbolic_tangent, logarithm, power, sine,
+};
 use crate::numbers::lanes::{Lanes, note_branch, token};
-use crate::numbers::sine::{REDUCIBLE, Register, cosine, sine};
 use contact_geom::{Scalar, scalar_operators};
 use pulp::{Simd, bytemuck};
 use std::fmt::{Debug, Formatter};
@@ -99,18 +102,20 @@ impl<S: Simd, const K: usize> SimdBatch<S, K> {
         self.lanes().iter().any(|x| *x != 0.0)
     }
 
-    /// The value of a function whose argument is within the range of the argument reduction; NaN for arguments beyond
-    /// it.
+    /// The value of a function whose argument has an absolute value below a bound; NaN for other arguments.
     ///
     /// A trajectory with such an argument leaves the batch and is computed by itself. A branch to the function of the
     /// standard library would force all registers to memory.
     #[inline(always)]
-    fn within_range(self, argument: Self) -> Self {
-        let set = token::<S>();
-        let (range, none) = (set.splat_f64s(REDUCIBLE), set.splat_f64s(f64::NAN));
-        registers!(|k| {
-            set.select_f64s(set.less_than_f64s(Lanes::<S>(argument.0[k]).abs().0, range), self.0[k], none)
-        })
+    fn within(self, argument: Self, bound: f64) -> Self {
+        Scalar::abs(argument).where_less(Self::splat(bound), self, Self::splat(f64::NAN))
+    }
+
+    /// The value of a function whose argument is a positive normal number; NaN for other arguments.
+    #[inline(always)]
+    fn of_positive(self, argument: Self) -> Self {
+        let none = Self::splat(f64::NAN);
+        Self::splat(f64::MIN_POSITIVE.next_down()).where_less(argument, self, none)
     }
 }
 
@@ -127,6 +132,14 @@ impl<S: Simd, const K: usize> Register for SimdBatch<S, K> {
     #[inline(always)]
     fn turned(self, of: Self) -> Self {
         registers!(|k| Lanes::<S>(self.0[k]).turned(Lanes(of.0[k])).0)
+    }
+    #[inline(always)]
+    fn where_less(self, b: Self, then: Self, otherwise: Self) -> Self {
+        registers!(|k| Lanes::<S>(self.0[k]).where_less(Lanes(b.0[k]), Lanes(then.0[k]), Lanes(otherwise.0[k])).0)
+    }
+    #[inline(always)]
+    fn map_digits(self, of: impl Fn(u64) -> u64) -> Self {
+        registers!(|k| Lanes::<S>(self.0[k]).map_digits(&of).0)
     }
 }
 
@@ -213,17 +226,28 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
         }
         if n < 0 { power.recip() } else { power }
     }
+    #[inline(always)]
     fn powf(self, a: f64) -> Self {
-        self.each(|x| x.powf(a))
+        if a.fract() == 0.0 {
+            return self.each(|x| x.powf(a));
+        }
+        let [value, product] = power(self, a);
+        let value = value.within(product, EXPONENT_RANGE).of_positive(self);
+        // Powers of 0 are frequent, as of the depth of a contact.
+        let at_zero = Self::splat(if a < 0.0 { f64::INFINITY } else { 0.0 });
+        Scalar::abs(self).where_less(Self::splat(f64::from_bits(1)), at_zero, value)
     }
+    #[inline(always)]
     fn exp(self) -> Self {
-        self.each(f64::exp)
+        exponential(self, Self::splat(0.0)).within(self, EXPONENT_RANGE)
     }
+    #[inline(always)]
     fn exp_m1(self) -> Self {
-        self.each(f64::exp_m1)
+        exponential_minus_one(self).within(self, EXPONENT_RANGE)
     }
+    #[inline(always)]
     fn ln(self) -> Self {
-        self.each(f64::ln)
+        logarithm(self).of_positive(self)
     }
     fn ln_1p(self) -> Self {
         self.each(f64::ln_1p)
@@ -235,25 +259,29 @@ impl<S: Simd, const K: usize> Scalar for SimdBatch<S, K> {
     }
     #[inline(always)]
     fn sin(self) -> Self {
-        sine(self).within_range(self)
+        sine(self).within(self, REDUCIBLE)
     }
     #[inline(always)]
     fn cos(self) -> Self {
-        cosine(self).within_range(self)
+        cosine(self).within(self, REDUCIBLE)
     }
     #[inline(always)]
     fn sin_versine(self) -> (Self, Self) {
         let half = Scalar::sin(self * 0.5);
         (Scalar::sin(self), half * half * 2.0)
     }
+    #[inline(always)]
     fn sinh(self) -> Self {
-        self.each(f64::sinh)
+        hyperbolic_sine(self).within(self, EXPONENT_RANGE)
     }
+    #[inline(always)]
     fn cosh(self) -> Self {
-        self.each(f64::cosh)
+        let e = exponential(self, Self::splat(0.0));
+        ((e + e.recip()) * 0.5).within(self, EXPONENT_RANGE)
     }
+    #[inline(always)]
     fn tanh(self) -> Self {
-        self.each(f64::tanh)
+        hyperbolic_tangent(self)
     }
     fn atan(self) -> Self {
         self.each(f64::atan)

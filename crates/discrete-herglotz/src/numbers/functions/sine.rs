@@ -1,13 +1,10 @@
 //! Sine and cosine in SIMD registers.
 
-use std::ops::{Add, Mul, Sub};
+use crate::numbers::functions::{ROUNDING, Register, polynomial};
 
 /// The bound on the arguments that are reduced modulo pi with pi in three parts: the number of half turns then has at
 /// most 19 binary digits.
 pub(crate) const REDUCIBLE: f64 = 5e5;
-
-/// 1.5 * 2^52: adding it rounds a smaller number to an integer, whose last binary digit is that of the sum.
-const ROUNDING: f64 = 6_755_399_441_055_744.0;
 
 /// pi to 107 binary digits, for fused multiply-add. The first difference is then exact: it is a multiple of the last
 /// digits of both terms, and below 2.
@@ -24,28 +21,17 @@ const PI_IN_PARTS: [f64; 3] = [
 /// The minimax polynomial (Remez) of degree 7 in `r^2` for `(sin r / r - 1) / r^2` on `|r| <= pi/2`. The relative error
 /// of the sine is 3.4e-19, and 3.6e-17 with rounded coefficients, a third of the round-off of the sine itself. The
 /// Taylor series needs eleven terms.
-const SINE: [f64; 8] = [
+const SINE: [f64; 6] = [
     2.731428986122616e-15,
     -7.643969031052769e-13,
     1.605_897_727_281_550_6e-10,
     -2.505_210_761_638_459_5e-8,
     2.755731921915843e-6,
     -1.984_126_984_125_495_5e-4,
-    8.333333333333316e-3,
-    -0.166_666_666_666_666_66,
 ];
 
-/// The operations on registers that the functions of this module use.
-pub(crate) trait Register: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// Whether [`mul_add`](Self::mul_add) is fused, with a single rounding.
-    const FUSED: bool;
-    /// A constant in all lanes.
-    fn splat(x: f64) -> Self;
-    /// `self b + c`.
-    fn mul_add(self, b: Self, c: Self) -> Self;
-    /// `self` with its sign changed in the lanes in which the last binary digit of `of` is 1.
-    fn turned(self, of: Self) -> Self;
-}
+/// Its last two coefficients.
+const SINE_END: [f64; 2] = [8.333333333333316e-3, -0.166_666_666_666_666_66];
 
 /// `sin x` for `|x|` below [`REDUCIBLE`], to 2 units in the last place and `1e-33 |x|`, the error of pi in two parts.
 #[inline(always)]
@@ -69,9 +55,7 @@ fn reduced<R: Register>(x: R, turns: R, rounded: R) -> R {
     let part = |r: R, part: f64| turns.mul_add(R::splat(-part), r);
     let r = if const { R::FUSED } { PI.into_iter().fold(x, part) } else { PI_IN_PARTS.into_iter().fold(x, part) };
     let y = r * r;
-    let mut sum = R::splat(SINE[0]);
-    for c in &SINE[1..] {
-        sum = sum.mul_add(y, R::splat(*c));
-    }
+    // The largest terms are summed one after another, with the fewest roundings.
+    let sum = SINE_END.into_iter().fold(polynomial(y, &SINE), |sum, c| sum.mul_add(y, R::splat(c)));
     (y * r).mul_add(sum, r).turned(rounded)
 }
