@@ -192,6 +192,34 @@ fn quantities_in_columns_and_events() {
     assert!(matches!(error, RuntimeError::FactorInEvent), "{error}");
 }
 
+/// Events by velocities of a mass matrix that is not diagonal: of a separable Lagrangian velocities are products of the
+/// inverse of this matrix; of one with the rate of a function of x in addition, of the same motion, they are found at each
+/// state.
+#[test]
+fn events_by_velocities() {
+    let crossings = |more: &str| {
+        let text = format!("x'^2 + x'*y' + 3*y'^2/2 + cos(x - y) - x^2/2{more}");
+        let system = System::parse(&text, &["x", "y"], &[]).unwrap();
+        let event = Event::new(system.formula().expression("x' - 0.3*y' - 0.1*x").unwrap());
+        let start = Start::new(0.0, [1.0, 0.4], [0.2, -0.5], 0.0);
+        let motion = Motion { events: vec![event], ..Motion::new(start, 20.0, by_steps(200)) };
+        let mut seen = Seen::default();
+        system.run(&motion, &mut seen).unwrap();
+        (system.structure().separable, seen.crossings)
+    };
+    let ((is_separable, found), (is_other_separable, expected)) = (crossings(""), crossings(" + x*x'"));
+    assert!(is_separable && !is_other_separable);
+    assert!(found.len() > 5 && found.len() == expected.len(), "{found:?}, {expected:?}");
+    for (a, b) in found.iter().zip(&expected) {
+        let off = [a.t - b.t, a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[0] - 0.3 * a.v[1] - 0.1 * a.q[0]];
+        // The round-off of sixty steps, and of the time of a root.
+        assert!(off.iter().all(|off| off.abs() <= 64.0 * 16.0 * f64::EPSILON), "{a:?}, {b:?}");
+        // p = M v.
+        let of_p = [a.p[0] - (2.0 * a.v[0] + a.v[1]), a.p[1] - (a.v[0] + 3.0 * a.v[1])];
+        assert!(of_p.iter().all(|off| off.abs() <= 16.0 * f64::EPSILON), "{a:?}");
+    }
+}
+
 #[test]
 fn a_terminal_event_ends_the_rows_too() {
     let system = pendulum();

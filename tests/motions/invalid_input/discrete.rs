@@ -77,6 +77,7 @@ pub const EXCEPTIONS: Exceptions = &[
     ("Rule::is_symmetric", "takes no number"),
     ("ActionFlow::*", "the implementor's; that of Riccati is tested with its callers"),
     ("Resets::new", "takes no number"),
+    ("StepView::inverse_mass", "takes no number; crates/runtime/tests/motions"),
     ("StepView::is_at_rest", "takes no number; crates/runtime/tests/rest.rs"),
     ("StepView::resets", "takes no number; tests/motions/resets"),
     ("Stepper::last_step", "takes no number"),

@@ -2,6 +2,7 @@
 
 use crate::run::ResolvedStep;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
+use contact_geom::nalgebra::DMatrix;
 
 /// A velocity of the motion near a state; `None` stands for the velocity at the start.
 pub(crate) type NearbyVelocity<'v> = Option<&'v Vector>;
@@ -10,6 +11,10 @@ pub(crate) type NearbyVelocity<'v> = Option<&'v Vector>;
 pub(crate) trait Motion {
     /// The velocity at a state; if several velocities have its momentum, the one close to `near`.
     fn velocity(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<Vector, StepError>;
+
+    /// The inverse of the constant mass matrix M of a separable Lagrangian, whose velocities are `M^-1 p`; `None` for any
+    /// other.
+    fn inverse_mass(&self) -> Option<&DMatrix<f64>>;
 
     /// The velocity and the energy at a state.
     fn velocity_and_energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<(Vector, f64), StepError>;
@@ -30,12 +35,12 @@ pub(crate) trait Motion {
         curve: Option<&DenseStep>,
     ) -> Result<(State, f64), StepError>;
 
-    /// The motion between the ends of the last step of a stepper, which was not divided, as polynomials. `None`, the default,
-    /// where states within a step are computed by [steps](Self::state_within_step).
+    /// The motion between the ends of the last step of a stepper, which was not divided, as polynomials; its curve may be
+    /// known. `None`, the default, where states within a step are computed by [steps](Self::state_within_step).
     fn resolve(
         &self,
         _ends: (&(f64, State), &(f64, State)),
-        _stepper: &dyn Stepper,
+        _step: (&dyn Stepper, Option<&DenseStep>),
         _near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
         None

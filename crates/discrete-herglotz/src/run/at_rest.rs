@@ -7,6 +7,7 @@ use crate::run::integrate::Integration;
 use crate::run::observers::observer::Observer;
 use crate::run::observers::step_view::StepView;
 use crate::{DenseStep, State, StepError, StepFailure, Stepper, Vector};
+use contact_geom::nalgebra::DMatrix;
 
 /// The number of steps in an interval of the rest, where an observer follows it: between two of them the run can be
 /// interrupted.
@@ -89,6 +90,10 @@ impl StepDetails for AtRest<'_> {
 impl Motion for AtRest<'_> {
     fn velocity(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<Vector, StepError> {
         self.motion.velocity(t, state, near)
+    }
+
+    fn inverse_mass(&self) -> Option<&DMatrix<f64>> {
+        self.motion.inverse_mass()
     }
 
     fn velocity_and_energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<(Vector, f64), StepError> {

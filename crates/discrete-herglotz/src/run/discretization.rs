@@ -195,17 +195,15 @@ impl<'p> Discretization<'p> {
 
     /// The velocity `M^-1 p` of a momentum of a separable Lagrangian, and `None` for any other.
     fn velocity_of_separable(&self, p: &Vector) -> Option<Vector> {
-        let SystemProblem { system, t0, start, structure, .. } = &self.problem;
-        let inverse_mass = self.inverse_mass.get_or_init(|| {
-            let mass = || system.mass_matrix(*t0, start);
-            if structure.separable { mass_matrix::inverse(&mass()).ok() } else { None }
-        });
-        let inverse = inverse_mass.as_ref()?;
-        let mut v = Vector::zeros(p.len());
-        for (column, p) in inverse.column_iter().zip(p) {
-            v.iter_mut().zip(&column).for_each(|(v, entry)| *v += entry * p);
+        self.inverse_mass().map(|inverse| Vector::product(inverse, p))
+    }
+
+    /// The velocity at a state; if several velocities have its momentum, the one close to the guess.
+    pub fn velocity_near(&self, t: f64, state: &State, guess: &Vector) -> Result<Vector, StepError> {
+        if let Some(v) = self.velocity_of_separable(&state.p) {
+            return if v.iter().all(|v| v.is_finite()) { Ok(v) } else { Err(StepError::NonFinite) };
         }
-        Some(v)
+        self.problem.system.legendre_inverse(t, state, guess).map(|x| x.v)
     }
 
     /// A guess of the velocity. For a constant mass the velocity is unique.
@@ -261,10 +259,16 @@ impl<'p> Discretization<'p> {
 
 impl Motion for Discretization<'_> {
     fn velocity(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<Vector, StepError> {
-        if let Some(v) = self.velocity_of_separable(&state.p) {
-            return if v.iter().all(|v| v.is_finite()) { Ok(v) } else { Err(StepError::NonFinite) };
-        }
-        self.problem.system.legendre_inverse(t, state, self.guess(near)).map(|x| x.v)
+        self.velocity_near(t, state, self.guess(near))
+    }
+
+    fn inverse_mass(&self) -> Option<&DMatrix<f64>> {
+        let SystemProblem { system, t0, start, structure, .. } = &self.problem;
+        let inverse_mass = self.inverse_mass.get_or_init(|| {
+            let mass = || system.mass_matrix(*t0, start);
+            if structure.separable { mass_matrix::inverse(&mass()).ok() } else { None }
+        });
+        inverse_mass.as_ref()
     }
 
     fn velocity_and_energy(&self, t: f64, state: &State, near: NearbyVelocity<'_>) -> Result<(Vector, f64), StepError> {
@@ -326,9 +330,9 @@ impl Motion for Discretization<'_> {
     fn resolve(
         &self,
         ends: (&(f64, State), &(f64, State)),
-        stepper: &dyn Stepper,
+        step: (&dyn Stepper, Option<&DenseStep>),
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
-        Discretization::resolve(self, ends, stepper, near)
+        Discretization::resolve(self, ends, step, near)
     }
 }

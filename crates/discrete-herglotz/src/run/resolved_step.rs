@@ -57,6 +57,12 @@ impl ResolvedStep {
     }
 }
 
+/// The curve of the last step of a stepper, without its action where that is not needed.
+pub(crate) fn curve_of(stepper: &dyn Stepper, with_action: bool) -> Option<DenseStep> {
+    let without_action = if with_action { None } else { stepper.solved_stages().map(curve_through) };
+    without_action.or_else(|| stepper.dense())
+}
+
 /// Equal parts of a step.
 struct Parts {
     curves: Vec<DenseStep>,
@@ -66,15 +72,11 @@ struct Parts {
 }
 
 impl Parts {
-    /// The curve of the last step of a stepper, without its action where that is not needed.
-    fn curve(stepper: &dyn Stepper, with_action: bool) -> Option<DenseStep> {
-        if with_action { stepper.dense() } else { stepper.solved_stages().map(curve_through) }
-    }
-
-    /// The last step of a stepper as a whole.
-    fn whole(stepper: &dyn Stepper, with_action: bool) -> Option<Self> {
+    /// The last step of a stepper as a whole; its curve may be known.
+    fn whole((stepper, known): (&dyn Stepper, Option<&DenseStep>), with_action: bool) -> Option<Self> {
         let log_factors = vec![0.0, stepper.sigma().ln()];
-        Some(Parts { curves: vec![Self::curve(stepper, with_action)?], log_factors, end: stepper.state() })
+        let curve = known.cloned().or_else(|| curve_of(stepper, with_action))?;
+        Some(Parts { curves: vec![curve], log_factors, end: stepper.state() })
     }
 
     /// The next steps of a stepper.
@@ -82,7 +84,7 @@ impl Parts {
         let (mut curves, mut log_factors, mut log_factor) = (Vec::with_capacity(count), vec![0.0], 0.0);
         for _ in 0..count {
             stepper.advance(1).ok()?;
-            curves.push(Self::curve(stepper, with_action)?);
+            curves.push(curve_of(stepper, with_action)?);
             log_factor += stepper.sigma().ln();
             log_factors.push(log_factor);
         }
@@ -114,7 +116,7 @@ impl<'p> Discretization<'p> {
     pub fn resolve(
         &self,
         (from, to): (&(f64, State), &(f64, State)),
-        stepper: &dyn Stepper,
+        step: (&dyn Stepper, Option<&DenseStep>),
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
         let own = self.info.collocation.filter(|_| !self.needs.exact)?;
@@ -123,14 +125,14 @@ impl<'p> Discretization<'p> {
         let (stages, length) = ((2 * own + 1).min(MAX_STAGES), to.0 - from.0);
         // In transformed time its curve is no polynomial in t.
         let tries_own = own >= MIN_STAGES && !self.info.in_transformed_time;
-        let mut found = if tries_own { Parts::whole(stepper, with_action) } else { None };
+        let mut found = if tries_own { Parts::whole(step, with_action) } else { None };
         // With the most stages the step itself is the first part.
         let mut count = usize::from(tries_own && own == MAX_STAGES);
         let mut v = None;
         loop {
             let excess = found.as_ref().map_or(f64::INFINITY, |parts| self.excess(parts, &to.1, with_action));
             if let Some(parts) = found.filter(|_| excess <= 1.0) {
-                let of_log_factor = stepper.sigma().ln() - parts.log_factors.last()?;
+                let of_log_factor = step.0.sigma().ln() - parts.log_factors.last()?;
                 let (difference, order) = (parts.difference(&to.1), self.info.order as i32);
                 return Some(ResolvedStep { parts, t: from.0, length, difference, of_log_factor, order });
             }

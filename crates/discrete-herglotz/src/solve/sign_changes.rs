@@ -110,6 +110,11 @@ pub(crate) fn has_no_zero(samples: &Samples, margin: f64) -> bool {
     samples.interpolant().exceeds(margin)
 }
 
+/// Whether an interpolant is taken for its function.
+pub(crate) fn resolves(interpolant: &Chebyshev, scale: Scale) -> bool {
+    interpolant.error <= MAX_ERROR * scale.size + MAX_DEGREE as f64 * scale.noise
+}
+
 /// Examines the parts of the interval in order, and appends the ends of those with at most one sign change, and their
 /// extrema.
 fn parts(first: &Samples, scale: Scale, g: &mut impl FnMut(f64) -> f64, points: &mut Vec<Separator>) -> Separation {
@@ -173,7 +178,7 @@ fn verdict(samples: &Samples, scale: Scale) -> Verdict {
     if g.is_nearly_constant(SMALL_VARIATION) {
         return Verdict::SeparatedAt(node(samples.degree(), samples.smallest()));
     }
-    if g.error > MAX_ERROR * scale.size + MAX_DEGREE as f64 * scale.noise {
+    if !resolves(&g, scale) {
         return Verdict::Open;
     }
     let slope = g.derivative();

@@ -27,19 +27,36 @@ pub(crate) const MAX_BY_COLUMNS: usize = 16;
 /// # Errors
 /// [`SingularMatrix`].
 pub(crate) fn inverse(m: &DMatrix<f64>) -> Result<DMatrix<f64>, SingularMatrix> {
-    if m.nrows() > MAX_BY_COLUMNS {
+    if m.nrows() > MAX_BY_COLUMNS && !is_diagonal(m) {
         return m.clone().try_inverse().ok_or(SingularMatrix { pivot: 0.0 });
     }
     inverse_by_columns(m)
 }
 
-/// The inverse of a matrix whose size is known at run time, computed column by column.
+/// Whether all entries beside the diagonal are 0.
+fn is_diagonal(m: &DMatrix<f64>) -> bool {
+    (0..m.ncols()).all(|j| (0..m.nrows()).all(|i| i == j || m[(i, j)] == 0.0))
+}
+
+/// The inverse of a matrix whose size is known at run time, computed column by column, or by its diagonal.
 ///
 /// # Errors
 /// [`SingularMatrix`].
 pub(crate) fn inverse_by_columns(m: &DMatrix<f64>) -> Result<DMatrix<f64>, SingularMatrix> {
     let n = m.nrows();
-    let (mut inverse, mut copy) = (DMatrix::identity(n, n), DMatrix::zeros(n, n));
+    let mut inverse = DMatrix::identity(n, n);
+    if is_diagonal(m) {
+        for i in 0..n {
+            let pivot = m[(i, i)].abs();
+            // Written so that a NaN is singular.
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return Err(SingularMatrix { pivot });
+            }
+            inverse[(i, i)] /= m[(i, i)];
+        }
+        return Ok(inverse);
+    }
+    let mut copy = DMatrix::zeros(n, n);
     for mut column in inverse.column_iter_mut() {
         copy.copy_from(m);
         linear::solve(&mut copy, &mut column)?;

@@ -1,6 +1,6 @@
 //! Vectors of coordinates.
 
-use contact_geom::nalgebra::{DVectorView, SVector};
+use contact_geom::nalgebra::{DMatrix, DVectorView, SVector};
 use contact_geom::numbers::max_abs_or_nan;
 use std::fmt::{Debug, Formatter};
 use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub, SubAssign};
@@ -66,6 +66,18 @@ impl Vector {
             Ok(x) => x.into(),
             Err(_) => SVector::from_fn(|i, _| x.get(i).copied().unwrap_or(f64::NAN)),
         }
+    }
+
+    /// The product of a matrix and a vector; its components are NaN if the numbers of columns and of components differ.
+    pub fn product(matrix: &DMatrix<f64>, x: &[f64]) -> Self {
+        let mut product = Vector::zeros(matrix.nrows());
+        if matrix.ncols() != x.len() {
+            product.fill(f64::NAN);
+        }
+        for (column, x) in matrix.column_iter().zip(x) {
+            product.iter_mut().zip(&column).for_each(|(sum, entry)| *sum += entry * x);
+        }
+        product
     }
 
     /// The vector with a function of each component.

@@ -82,6 +82,10 @@ pub fn legendre_inverse<const N: usize>(
             x.v = from - change;
             momenta = system.gradient(t, &x).y;
         }
+        // A velocity whose momentum is the given one to round-off needs no other correction.
+        if (momenta - state.p).iter().zip(&state.p).all(|(off, p)| off.abs() <= f64::EPSILON * p.abs()) {
+            return Ok(x);
+        }
     }
     Err(StepError::NotConverged { residual: before, iterations: ITERATION_LIMIT })
 }

@@ -5,6 +5,7 @@ use super::sized::coordinates;
 use crate::{
     AfterReset, Column, Crossing, Direction, InitialVelocity, Motion, OutputTimes, RunMonitor, RuntimeError, Start,
 };
+use contact_geom::nalgebra::DMatrix;
 use discrete_herglotz::support::sorted;
 use discrete_herglotz::{
     Event, Events, InputError, Observer, OutputRequest, Point, Reset, Row, Rows, RunInfo, State, StepView, Stop,
@@ -196,6 +197,8 @@ struct EventContext {
     start_time: Cell<f64>,
     /// The last velocity that was found, the initial guess for the next.
     velocity: RefCell<Vector>,
+    /// The matrix whose product with the momentum is the velocity, if there is one.
+    inverse_mass: RefCell<Option<DMatrix<f64>>>,
 }
 
 /// An expression as a function of time and of a state `(q, p, z)` of a motion.
@@ -208,7 +211,10 @@ fn at_states<'r>(
     let rate = lagrangian.constant_rate().unwrap_or(f64::NAN);
     move |t, state| {
         if function.has_velocity() {
-            let found = lagrangian.velocity_or_momentum(t, state, &context.velocity.borrow());
+            let found = match &*context.inverse_mass.borrow() {
+                Some(inverse) => Some(Vector::product(inverse, &state.p)),
+                None => lagrangian.velocity_or_momentum(t, state, &context.velocity.borrow()),
+            };
             match found {
                 Some(v) => context.velocity.replace(v),
                 None => return f64::NAN,
@@ -247,7 +253,8 @@ impl<'r> Crossings<'r> {
         };
         // The velocity is set to zero where none is given: an expression that does not contain it ignores it.
         let v = Vector::from_fn(lagrangian.formula().dimension(), |i| numbers.get(i).copied().unwrap_or(0.0));
-        let context = Rc::new(EventContext { start_time: Cell::new(0.0), velocity: RefCell::new(v) });
+        let (start_time, velocity, inverse_mass) = (Cell::new(0.0), RefCell::new(v), RefCell::new(None));
+        let context = Rc::new(EventContext { start_time, velocity, inverse_mass });
         let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
         let searched: Vec<usize> = (0..events.len()).filter(|i| events[*i].reset.is_none()).collect();
         let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));
@@ -276,10 +283,13 @@ impl<'r> Crossings<'r> {
     }
 
     pub fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
-        if self.velocity
-            && let Ok(v) = at.velocity()
-        {
-            self.context.velocity.replace(v);
+        if self.velocity {
+            // The expressions of a Hamiltonian contain the momentum in the place of the velocity.
+            let inverse_mass = at.inverse_mass().filter(|_| !self.lagrangian.formula().is_hamiltonian());
+            self.context.inverse_mass.replace(inverse_mass.cloned());
+            if let Ok(v) = at.velocity() {
+                self.context.velocity.replace(v);
+            }
         }
         self.events.start(at)
     }

@@ -77,7 +77,8 @@ impl EnergyMonitor {
             return None;
         }
         let near = stepper.last_velocity();
-        let x = system.legendre_inverse(t, state, near.as_ref().unwrap_or(&self.guess)).ok()?;
+        let v = steps.velocity_near(t, state, near.as_ref().unwrap_or(&self.guess)).ok()?;
+        let x = Point { q: state.q.clone(), v, z: state.z };
         let Energies { total, kinetic, terms } = energies(system, t, &x, state)?;
         let log_factor = self.rate.map_or(log_factor, |rate| rate * (t - problem.t0));
         let drift = self.drift.defect(&EnergySample { total, kinetic, terms, log_factor, taken }, |sigma| {
@@ -107,12 +108,14 @@ pub(crate) fn may_drift(system: &dyn System, order: u32, (t0, from): (f64, &Stat
 
 /// The energy at a state, with the kinetic energy `v.Wv/2` as the sum of the magnitudes of its terms.
 fn energies(system: &dyn System, t: f64, x: &Point, state: &State) -> Option<Energies> {
-    let AtState { l, rate: slope, .. } = system.at_state(t, state, &x.v).ok()?;
     let (n, mut kinetic) = (system.dimension(), 0.0);
+    let (l, slope);
     if system.hints().hamiltonian {
+        AtState { l, rate: slope, .. } = system.at_state(t, state, &x.v).ok()?;
         // The mass matrix need not exist.
         kinetic = (0..n).map(|i| 0.5 * (state.p[i] * x.v[i]).abs()).sum();
     } else {
+        (l, slope) = (system.value(t, x), system.gradient(t, x).z);
         let w = system.mass_matrix(t, x);
         for i in 0..n {
             for j in 0..n {

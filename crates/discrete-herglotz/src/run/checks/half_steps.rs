@@ -4,19 +4,19 @@ use crate::integration::{SuspectInterval, SystemProblem};
 use crate::resolution::monitor::rounding;
 use crate::resolution::thresholds::{FIRST_ORDER_STEPS, MAX_HALF_STEP_DIFFERENCE, MIN_RELATIVE_DISPLACEMENT};
 use crate::run::discretization::Discretization;
-use crate::{Point, State, Vector};
+use crate::{State, Vector};
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 
 impl Discretization<'_> {
     /// The defect of some steps, above one if they do not resolve the motion. `None` if no comparison is possible.
     pub(crate) fn half_step_defect(&self, SuspectInterval { steps, t, from, to, .. }: &SuspectInterval) -> Option<f64> {
-        let SystemProblem { system, start, structure, .. } = &self.problem;
+        let SystemProblem { start, structure, .. } = &self.problem;
         let end = t + *steps as f64 * self.h;
         // If several velocities have the same momentum, the mean velocity selects that of the motion.
         let mean = (&to.q - &from.q) / (end - t);
         let guess = if structure.constant_mass { &start.v } else { &mean };
-        let Point { v, .. } = system.legendre_inverse(*t, from, guess).ok()?;
-        let at_end = |x: &State| system.legendre_inverse(end, x, &v).map(|x| x.v).ok();
+        let v = self.velocity_near(*t, from, guess).ok()?;
+        let at_end = |x: &State| self.velocity_near(end, x, &v).ok();
         if self.info.in_transformed_time {
             return None;
         }

@@ -6,9 +6,9 @@ use crate::run::observers::event::{Crossing, Event};
 use crate::run::observers::event_roots::RELATIVE_ROUND_OFF;
 use crate::run::observers::last_step::LastStep;
 use crate::run::observers::output_request::RunInfo;
-use crate::solve::chebyshev::{Samples, node};
+use crate::solve::chebyshev::{Chebyshev, Samples, node};
 use crate::solve::sign_changes::opposite_signs;
-use crate::solve::sign_changes::{Scale, Separation, Separator, has_no_zero, separate};
+use crate::solve::sign_changes::{Scale, Separation, Separator, has_no_zero, resolves, separate};
 use crate::{State, StepError};
 
 /// The value of an event function, relative to its size in the step, below which the function may be on its surface g =
@@ -64,6 +64,8 @@ struct Scan<'s> {
     near: f64,
     /// Where the function leaves its surface after the end of the step, if the end is on it.
     departure: Option<Departure>,
+    /// The function along the interpolated step as a polynomial, if one resolves it.
+    curve: Option<&'s Chebyshev>,
 }
 
 /// The time scales of a run, which decide whether a point is on a surface.
@@ -162,11 +164,13 @@ impl Event<'_> {
             return Ok(());
         }
         let (before, count) = (last_sign.clone(), found.len());
-        let scan = Scan { points, separation, on_motion, near, departure };
+        let curve = samples.interpolant();
+        let curve = (!on_motion && resolves(&curve, scale)).then_some(&curve);
+        let scan = Scan { points, separation, on_motion, near, departure, curve };
         if !self.scan(index, step, scan, last_sign, found)? {
             *last_sign = before;
             found.truncate(count);
-            self.scan(index, step, Scan { on_motion: true, ..scan }, last_sign, found)?;
+            self.scan(index, step, Scan { on_motion: true, curve: None, ..scan }, last_sign, found)?;
         }
         last_sign.departure = departure;
         Ok(())
@@ -198,7 +202,7 @@ impl Event<'_> {
         &mut self,
         index: usize,
         step: &mut LastStep<'_>,
-        Scan { points, separation, on_motion, near, departure }: Scan<'_>,
+        Scan { points, separation, on_motion, near, departure, curve }: Scan<'_>,
         last_sign: &mut LastSign,
         found: &mut Vec<Crossing>,
     ) -> Result<bool, StepError> {
@@ -246,7 +250,7 @@ impl Event<'_> {
                 Change::There(t, state) => found.push(Crossing { t, event: index, state }),
                 Change::Between(values) => {
                     let root = match on_motion {
-                        false => self.root_by_newton(step, ends)?,
+                        false => self.root_by_newton(step, ends, curve)?,
                         true => Some(self.root(step, ends, values)?),
                     };
                     let Some((t, state)) = root else { return Ok(false) };

@@ -2,6 +2,7 @@
 
 use crate::run::observers::event::Event;
 use crate::run::observers::last_step::{LastStep, TaylorPolynomial};
+use crate::solve::chebyshev::Chebyshev;
 use crate::solve::roots::{bracketed_root, bracketed_root_within};
 use crate::solve::sign_changes::opposite_signs;
 use crate::{State, StepError};
@@ -52,15 +53,19 @@ impl Event<'_> {
         Ok((step.time(tau), step.at(step.time(tau))?))
     }
 
-    /// The same root by Newton's method, which starts from the root of the interpolant and uses its slope: two states
-    /// of the motion are enough if the step resolves the motion. `None` if the iteration does not converge, as when the
-    /// function jumps.
+    /// The same root by Newton's method, which starts from the root of the interpolant, or of the polynomial of the function
+    /// along it, and uses its slope: two states of the motion are enough if the step resolves the motion. `None` if the
+    /// iteration does not converge, as when the function jumps.
     pub(super) fn root_by_newton(
         &mut self,
         step: &mut LastStep<'_>,
         [a, b]: [f64; 2],
+        curve: Option<&Chebyshev>,
     ) -> Result<Option<(f64, State)>, StepError> {
-        let mut interpolant = |tau: f64| self.on_interpolant(step, tau);
+        let mut interpolant = |tau: f64| match curve {
+            Some(curve) => Ok(curve.at(tau)),
+            None => self.on_interpolant(step, tau),
+        };
         let ends = [interpolant(a)?, interpolant(b)?];
         // Written so that a NaN is not a sign change.
         let brackets = opposite_signs(ends[0], ends[1]);
@@ -90,6 +95,7 @@ impl Event<'_> {
                 return Ok(Some(at));
             }
             if change.abs() <= TaylorPolynomial::MAX_DISTANCE
+                && !step.is_resolved()
                 && let Some(found) = self.root_by_taylor(step, (tau, &at.1), slope, change)?
             {
                 return Ok(Some(found));

@@ -3,6 +3,7 @@
 use crate::integration::motion::Motion;
 use crate::integration::{Piece, PieceStart};
 use crate::run::ResolvedStep;
+use crate::run::resolved_step::curve_of;
 use crate::solve::chebyshev::node;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
 use std::cell::OnceCell;
@@ -154,11 +155,17 @@ impl<'r> LastStep<'r> {
         self.stepper.pieces().is_empty()
     }
 
+    /// Whether polynomials resolve the motion between the ends, so that a state there costs little.
+    pub(crate) fn is_resolved(&self) -> bool {
+        self.resolved().is_some()
+    }
+
     /// The motion between the ends, if polynomials resolve it.
     fn resolved(&self) -> Option<&ResolvedStep> {
-        let LastStep { from, to, motion, stepper, .. } = self;
+        let LastStep { from, to, motion, stepper, curve, .. } = self;
         let resolved = self.resolved.get_or_init(|| {
-            let found = || motion.resolve((from, to), *stepper, stepper.last_velocity().as_ref());
+            let curve = curve.as_ref().and_then(Option::as_deref);
+            let found = || motion.resolve((from, to), (*stepper, curve), stepper.last_velocity().as_ref());
             if self.is_undivided() { found().map(Box::new) } else { None }
         });
         resolved.as_deref()
@@ -221,7 +228,9 @@ impl<'r> LastStep<'r> {
     }
 
     fn curve(&mut self) -> Option<&DenseStep> {
-        self.curve.get_or_insert_with(|| self.stepper.dense().map(Box::new)).as_deref()
+        // An action that is not requested, and does not act on the motion, keeps its value.
+        let with_action = self.to.1.z != self.from.1.z;
+        self.curve.get_or_insert_with(|| curve_of(self.stepper, with_action).map(Box::new)).as_deref()
     }
 
     /// The interpolated state at a fraction of the step, without taking a step: by the collocation polynomial if there

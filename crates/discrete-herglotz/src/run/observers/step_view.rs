@@ -6,6 +6,7 @@ use crate::run::findings::Findings;
 use crate::run::observers::last_step::LastStep;
 use crate::run::resume_state::ResumeState;
 use crate::{Reset, State, StepError, Stepper, Vector};
+use contact_geom::nalgebra::DMatrix;
 
 /// The request of an observer to end the run.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,6 +64,12 @@ impl<'r> StepView<'r> {
     /// A [`StepError`] if no velocity has this momentum.
     pub fn velocity(&self) -> Result<Vector, StepError> {
         self.motion.velocity(self.t, &self.state, self.stepper.last_velocity().as_ref())
+    }
+
+    /// The inverse of the constant mass matrix M of a separable Lagrangian, whose velocities are `M^-1 p`; `None` for any
+    /// other.
+    pub fn inverse_mass(&self) -> Option<&'r DMatrix<f64>> {
+        self.motion.inverse_mass()
     }
 
     /// The velocity at another state of the motion.
