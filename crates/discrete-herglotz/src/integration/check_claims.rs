@@ -127,7 +127,7 @@ pub(crate) fn force_defect<const N: usize>(
 /// where L is not defined, or where the inverse Legendre transformation fails.
 pub(crate) fn violated_claim(system: &dyn System, t: f64, state: &State, guess: &[f64]) -> Option<Defect> {
     let hints = system.hints();
-    if hints.proved && !hints.forced {
+    if hints.proved && !(hints.forced && system.has_force()) {
         return None;
     }
     if hints.hamiltonian {
