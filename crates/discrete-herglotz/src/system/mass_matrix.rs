@@ -88,3 +88,28 @@ pub(crate) fn inverted<const N: usize>(m: &SMatrix<f64, N, N>) -> Result<Box<SMa
     }
     Ok(Box::new(inverse))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The inverse of a diagonal matrix, and of one with another entry, of few and of many coordinates.
+    #[test]
+    fn a_matrix_times_its_inverse_is_the_identity() {
+        for n in [1, 3, MAX_BY_COLUMNS, MAX_BY_COLUMNS + 4] {
+            let diagonal = DMatrix::from_fn(n, n, |i, j| if i == j { 2.0 + i as f64 } else { 0.0 });
+            let mut other = diagonal.clone();
+            other[(n - 1, 0)] += 0.25;
+            for m in [&diagonal, &other] {
+                let off = (inverse(m).unwrap() * m - DMatrix::identity(n, n)).amax();
+                assert!(off <= 2.0 * f64::EPSILON, "{n}: {off:e}");
+            }
+            for entry in [0.0, f64::NAN, f64::INFINITY] {
+                let mut singular = diagonal.clone();
+                singular[(n / 2, n / 2)] = entry;
+                let pivot = inverse(&singular).unwrap_err().pivot;
+                assert!(pivot == entry || pivot.is_nan() && entry.is_nan(), "{n}: {pivot}, not {entry}");
+            }
+        }
+    }
+}
