@@ -25,10 +25,9 @@ use std::rc::Rc;
 ///
 /// The stages are evaluated in SIMD lanes. Their initial guess is extrapolated from the step before, the fixed-point
 /// iteration runs to round-off, or to the requested [tolerance](StepperOptions::tolerance), and the state is advanced by
-/// compensated sums. If the fixed-point iteration does not
-/// converge, simplified Newton iteration is used, with a Jacobian that is kept as long as the iteration converges fast;
-/// if that does not converge either, Newton's method is used, in the stage positions alone if the mass matrix and the
-/// rate are constant. The step fails if none of them converges.
+/// compensated sums. If the fixed-point iteration does not converge, simplified Newton iteration is used, with a Jacobian
+/// that is kept as long as the iteration converges fast; if that does not converge either, Newton's method is used, in the
+/// stage positions alone if the mass matrix and the rate are constant. The step fails if none of them converges.
 pub struct GaussStepper<'a> {
     system: Box<dyn CollocationSystem + 'a>,
     depends_on_action: bool,

@@ -35,6 +35,11 @@ pub(crate) trait Motion {
         curve: Option<&DenseStep>,
     ) -> Result<(State, f64), StepError>;
 
+    /// Dense output of the last step of a stepper, with its action where that is followed.
+    fn curve(&self, _ends: (&(f64, State), &(f64, State)), stepper: &dyn Stepper) -> Option<DenseStep> {
+        stepper.dense()
+    }
+
     /// The motion between the ends of the last step of a stepper, which was not divided, as polynomials; its curve may be
     /// known. `None`, the default, where states within a step are computed by [steps](Self::state_within_step).
     fn resolve(

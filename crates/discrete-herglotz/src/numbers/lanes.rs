@@ -243,13 +243,19 @@ impl<S: Simd> Scalar for Lanes<S> {
     }
     #[inline(always)]
     fn powf(self, a: f64) -> Self {
+        let of_each = |x: Self| x.each(|x| x.powf(a));
+        if const { !Self::FUSED } || a.fract() == 0.0 {
+            return of_each(self);
+        }
         let [zero, one] = [0.0, 1.0].map(Self::splat);
         // Powers of 0 are frequent, as of the depth of a contact.
         let is_zero = Lanes::abs(self).where_less(Self::splat(f64::from_bits(1)), one, zero);
-        let [value, product] = power(self.where_less(Self::splat(f64::MIN_POSITIVE), one, self), a);
-        let is_usable = const { Self::FUSED } && a.fract() != 0.0 && product.is_below(EXPONENT_RANGE);
-        if !(is_usable && (self + is_zero).is_positive()) {
-            return self.each(|x| x.powf(a));
+        if !(self + is_zero).is_positive() {
+            return of_each(self);
+        }
+        let [value, product] = power(self + is_zero, a);
+        if !product.is_below(EXPONENT_RANGE) {
+            return of_each(self);
         }
         let at_zero = Self::splat(if a < 0.0 { f64::INFINITY } else { 0.0 });
         zero.where_less(is_zero, at_zero, value)

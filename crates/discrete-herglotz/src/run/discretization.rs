@@ -327,6 +327,10 @@ impl Motion for Discretization<'_> {
         Ok((run.state(), run.sigma()))
     }
 
+    fn curve(&self, ends: (&(f64, State), &(f64, State)), stepper: &dyn Stepper) -> Option<DenseStep> {
+        Discretization::curve(self, ends, stepper)
+    }
+
     fn resolve(
         &self,
         ends: (&(f64, State), &(f64, State)),

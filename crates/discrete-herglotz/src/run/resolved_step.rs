@@ -57,12 +57,6 @@ impl ResolvedStep {
     }
 }
 
-/// The curve of the last step of a stepper, without its action where that is not needed.
-pub(crate) fn curve_of(stepper: &dyn Stepper, with_action: bool) -> Option<DenseStep> {
-    let without_action = if with_action { None } else { stepper.solved_stages().map(curve_through) };
-    without_action.or_else(|| stepper.dense())
-}
-
 /// Equal parts of a step.
 struct Parts {
     curves: Vec<DenseStep>,
@@ -72,10 +66,16 @@ struct Parts {
 }
 
 impl Parts {
+    /// The curve of the last step of a stepper, without its action where that is not needed.
+    fn curve(stepper: &dyn Stepper, with_action: bool) -> Option<DenseStep> {
+        let without_action = if with_action { None } else { stepper.solved_stages().map(curve_through) };
+        without_action.or_else(|| stepper.dense())
+    }
+
     /// The last step of a stepper as a whole; its curve may be known.
     fn whole((stepper, known): (&dyn Stepper, Option<&DenseStep>), with_action: bool) -> Option<Self> {
         let log_factors = vec![0.0, stepper.sigma().ln()];
-        let curve = known.cloned().or_else(|| curve_of(stepper, with_action))?;
+        let curve = known.cloned().or_else(|| Self::curve(stepper, with_action))?;
         Some(Parts { curves: vec![curve], log_factors, end: stepper.state() })
     }
 
@@ -84,7 +84,7 @@ impl Parts {
         let (mut curves, mut log_factors, mut log_factor) = (Vec::with_capacity(count), vec![0.0], 0.0);
         for _ in 0..count {
             stepper.advance(1).ok()?;
-            curves.push(curve_of(stepper, with_action)?);
+            curves.push(Self::curve(stepper, with_action)?);
             log_factor += stepper.sigma().ln();
             log_factors.push(log_factor);
         }
@@ -120,8 +120,7 @@ impl<'p> Discretization<'p> {
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
         let own = self.info.collocation.filter(|_| !self.needs.exact)?;
-        // An action that is not requested, and does not act on the motion, keeps its value.
-        let with_action = self.needs.action || to.1.z != from.1.z;
+        let with_action = self.follows_action((from, to));
         let (stages, length) = ((2 * own + 1).min(MAX_STAGES), to.0 - from.0);
         // In transformed time its curve is no polynomial in t.
         let tries_own = own >= MIN_STAGES && !self.info.in_transformed_time;
@@ -142,6 +141,16 @@ impl<'p> Discretization<'p> {
             }
             found = Some(self.in_parts((stages, count), from, v.as_ref()?, length, with_action)?);
         }
+    }
+
+    /// Whether the action changes in a step: one that is not requested, and does not act on the motion, keeps its value.
+    fn follows_action(&self, (from, to): (&(f64, State), &(f64, State))) -> bool {
+        self.needs.action || to.1.z != from.1.z
+    }
+
+    /// Dense output of the last step of a stepper.
+    pub fn curve(&self, ends: (&(f64, State), &(f64, State)), stepper: &dyn Stepper) -> Option<DenseStep> {
+        Parts::curve(stepper, self.follows_action(ends))
     }
 
     /// The motion from a state by a number of stages in a number of equal parts.

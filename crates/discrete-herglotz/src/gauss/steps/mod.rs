@@ -45,10 +45,10 @@ pub(crate) struct Suspect {
 /// in all calls.
 ///
 /// The stages are evaluated in SIMD lanes. Their initial guess is extrapolated from the step before, the fixed-point
-/// iteration runs to the tolerance of the route, and the state is advanced by compensated sums. If the fixed-point iteration does not
-/// converge, simplified Newton iteration is used, with a Jacobian that is kept as long as the iteration converges fast;
-/// if that does not converge either, Newton's method is used, in the stage positions alone if the mass matrix and the
-/// rate are constant. The step fails if none of them converges.
+/// iteration runs to the tolerance of the route, and the state is advanced by compensated sums. If the fixed-point
+/// iteration does not converge, simplified Newton iteration is used, with a Jacobian that is kept as long as the iteration
+/// converges fast; if that does not converge either, Newton's method is used, in the stage positions alone if the mass
+/// matrix and the rate are constant. The step fails if none of them converges.
 pub(crate) struct GaussSteps {
     pub s: usize,
     pub h: f64,

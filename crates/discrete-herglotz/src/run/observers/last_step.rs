@@ -3,7 +3,6 @@
 use crate::integration::motion::Motion;
 use crate::integration::{Piece, PieceStart};
 use crate::run::ResolvedStep;
-use crate::run::resolved_step::curve_of;
 use crate::solve::chebyshev::node;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
 use std::cell::OnceCell;
@@ -228,9 +227,8 @@ impl<'r> LastStep<'r> {
     }
 
     fn curve(&mut self) -> Option<&DenseStep> {
-        // An action that is not requested, and does not act on the motion, keeps its value.
-        let with_action = self.to.1.z != self.from.1.z;
-        self.curve.get_or_insert_with(|| curve_of(self.stepper, with_action).map(Box::new)).as_deref()
+        let LastStep { from, to, motion, stepper, .. } = self;
+        self.curve.get_or_insert_with(|| motion.curve((from, to), *stepper).map(Box::new)).as_deref()
     }
 
     /// The interpolated state at a fraction of the step, without taking a step: by the collocation polynomial if there
