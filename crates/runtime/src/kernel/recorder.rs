@@ -284,9 +284,8 @@ impl<'r> Crossings<'r> {
 
     pub fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
         if self.velocity {
-            // The expressions of a Hamiltonian contain the momentum in the place of the velocity.
-            let inverse_mass = at.inverse_mass().filter(|_| !self.lagrangian.formula().is_hamiltonian());
-            self.context.inverse_mass.replace(inverse_mass.cloned());
+            // There is none for a Hamiltonian, whose expressions contain the momentum in the place of the velocity.
+            self.context.inverse_mass.replace(at.inverse_mass().cloned());
             if let Ok(v) = at.velocity() {
                 self.context.velocity.replace(v);
             }
