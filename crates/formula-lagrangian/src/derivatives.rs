@@ -238,6 +238,14 @@ impl Graph {
                     let part = self.mul(adjoint, slope);
                     let part = self.mul(part, b);
                     give(self, a, part);
+                    if asked(b) {
+                        // In the exponent, where the power is defined for exponents near this one.
+                        let (log, zero) = (self.unary(Function::Ln, a), self.number(0.0));
+                        let steep = self.mul(id, log);
+                        let steep = self.select([zero, a, steep, zero]);
+                        let part = self.mul(adjoint, steep);
+                        give(self, b, part);
+                    }
                 }
                 // Handled above.
                 Operation::Min | Operation::Max => {}

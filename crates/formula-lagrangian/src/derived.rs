@@ -6,6 +6,7 @@ use crate::cones::has_cones;
 use crate::derived_reset::DerivedReset;
 use crate::drag::ProvedForce;
 use crate::evaluation::At;
+use crate::explicit::ExplicitTapes;
 use crate::formula::index;
 use crate::limits::MOST_NODES;
 use crate::node::Inputs;
@@ -28,6 +29,8 @@ const MOST_NODES_WITH_HESSIAN: usize = 20 * MOST_NODES;
 #[derive(Clone, Debug)]
 pub(crate) struct Derived {
     pub formula: Formula,
+    /// L, with the kinetic energies of free particles for coordinates beyond those of the formula.
+    pub root: Id,
     /// Proved for all values of the parameters, except `z_free`, which refers to the present value of a constant rate.
     pub structure: Structure,
     pub smooth: bool,
@@ -47,8 +50,8 @@ pub(crate) struct Derived {
     pub with_gradient: Tape,
     /// `W` by columns.
     pub mass: Tape,
-    /// All second derivatives in the order qq, qv, vv, qz, vz, zz.
-    pub second: Tape,
+    /// `L_q`, `L_v`, `L_z`, the value, and all second derivatives in the order qq, qv, vv, qz, vz, zz.
+    pub with_second: Tape,
     /// The functions at whose zeros L or a force has kinks and jumps, and those of resets.
     pub switching: Tape,
     pub kinks: Kinks,
@@ -61,8 +64,8 @@ pub(crate) struct Derived {
     /// The value and the force for any values of the parameters.
     pub parametric_value: ParametricNodes,
     pub parametric_force: ParametricNodes,
-    /// `L_q`, `L_v`, `L_z` and the value, for any values of the parameters.
-    pub parametric_gradient: ParametricNodes,
+    /// The derivatives in parameters and time.
+    pub explicit: ExplicitTapes,
     /// The holonomic constraints.
     pub constraints: Tape,
     /// The nodes of these forces.
@@ -101,8 +104,8 @@ impl Derived {
         let with_force = tape(&graph, &of_kick)?;
         let gradient = tape(&graph, &partials)?;
         let rate = tape(&graph, partials.get(2 * n..).unwrap_or(&[]))?;
-        let all: Vec<Id> = partials.iter().copied().chain([root]).collect();
-        let with_gradient = tape(&graph, &all)?;
+        let with_value: Vec<Id> = partials.iter().copied().chain([root]).collect();
+        let with_gradient = tape(&graph, &with_value)?;
 
         let second = second_derivatives(&mut graph, &partials, &variables).ok_or(too_large.clone())?;
         let constants = graph.constants(&formula.values);
@@ -111,7 +114,8 @@ impl Derived {
         let pairs = |a: usize, b: usize| (0..n * n).map(move |k| entry(a + k % n, b + k / n));
         let mass: Vec<Id> = pairs(n, n).collect();
         let in_order = pairs(0, 0).chain(pairs(0, n)).chain(pairs(n, n));
-        let all: Vec<Id> = in_order.chain((0..size).map(|i| entry(i, 2 * n))).collect();
+        let in_order = in_order.chain((0..size).map(|i| entry(i, 2 * n)));
+        let all: Vec<Id> = with_value.into_iter().chain(in_order).collect();
         let of_motion: Vec<Id> = (0..4 * n * n).map(|k| entry(k / (2 * n), k % (2 * n))).collect();
         let (q, v) = partials.split_at(n);
         let (v, z) = v.split_at(n);
@@ -127,8 +131,8 @@ impl Derived {
             },
             false => HamiltonianStructure::default(),
         };
-        let (mass, second) = (Tape::new(&graph, &mass, n), Tape::new(&graph, &all, n));
-        let (Some(mass), Some(second)) = (mass, second) else { return Err(too_large.clone()) };
+        let (mass, with_second) = (Tape::new(&graph, &mass, n), Tape::new(&graph, &all, n));
+        let (Some(mass), Some(with_second)) = (mass, with_second) else { return Err(too_large.clone()) };
         let needed = graph.needed(root);
         let mut free = |i: usize| needed.get(graph.position(i as u32).index()) != Some(&true);
         let cyclic = (0..n).map(&mut free).collect();
@@ -147,13 +151,13 @@ impl Derived {
         };
         let parametric_value = ParametricNodes::new(&graph, &[root]);
         let parametric_force = ParametricNodes::new(&graph, &applied_nodes);
-        let of_gradient: Vec<Id> = partials.iter().copied().chain([root]).collect();
-        let parametric_gradient = ParametricNodes::new(&graph, &of_gradient);
         let proved_force = ProvedForce::of(&mut graph, &applied_nodes, n, MOST_NODES_WITH_HESSIAN);
         let constraints = Tape::new(&graph, &formula.constraints, n).ok_or(too_large)?;
         let formula = Formula { graph, ..formula.clone() };
+        let explicit = ExplicitTapes::new(formula.values.len());
         let mut derived = Derived {
             formula,
+            root,
             structure,
             smooth,
             cones,
@@ -166,7 +170,7 @@ impl Derived {
             rate,
             with_gradient,
             mass,
-            second,
+            with_second,
             switching,
             kinks,
             resets,
@@ -174,7 +178,7 @@ impl Derived {
             applied,
             parametric_value,
             parametric_force,
-            parametric_gradient,
+            explicit,
             constraints,
             applied_nodes,
             proved_force,
@@ -230,9 +234,13 @@ impl Derived {
         let matrix = SMatrix::<T, N, N>::from_element(at.z);
         let vector = SVector::<T, N>::from_element(at.z);
         let mut h = Hessian { qq: matrix, qv: matrix, vv: matrix, qz: vector, vz: vector, zz: at.z };
+        let (mut q, mut v, mut z, mut value) = (vector, vector, at.z, at.z);
+        let first =
+            [q.as_mut_slice(), v.as_mut_slice(), std::slice::from_mut(&mut z), std::slice::from_mut(&mut value)];
+        let [l_q, l_v, l_z, l] = first;
         let (qq, qv, vv) = (h.qq.as_mut_slice(), h.qv.as_mut_slice(), h.vv.as_mut_slice());
-        let results = &mut [qq, qv, vv, h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz)];
-        self.second.evaluate::<T, N>(at, results);
+        let (qz, vz, zz) = (h.qz.as_mut_slice(), h.vz.as_mut_slice(), std::slice::from_mut(&mut h.zz));
+        self.with_second.evaluate::<T, N>(at, &mut [l_q, l_v, l_z, l, qq, qv, vv, qz, vz, zz]);
         h
     }
 
@@ -246,17 +254,19 @@ impl Derived {
             rate,
             with_gradient,
             mass,
-            second,
+            with_second,
             switching,
             constraints,
             ..
         } = &mut *self;
-        for tape in [value, force, with_force, gradient, rate, with_gradient, mass, second, switching, constraints] {
+        for tape in [value, force, with_force, gradient, rate, with_gradient, mass, with_second, switching, constraints]
+        {
             tape.set_constants(&constants);
         }
         if let Some(applied) = &mut self.applied {
             applied.set_constants(&constants);
         }
+        self.explicit.set_constants(&self.formula.values);
         self.resets.iter_mut().for_each(|reset| reset.set_constants(&constants));
         self.proved_force.set_constants(&constants);
         self.breaks = self.kinks.times(&self.formula.graph, &constants, &self.formula.breaks);
@@ -271,7 +281,7 @@ impl Derived {
 }
 
 /// The nodes of q, v and z.
-fn variables(graph: &mut Graph, n: usize) -> Vec<Id> {
+pub(crate) fn variables(graph: &mut Graph, n: usize) -> Vec<Id> {
     let mut variables: Vec<Id> = (0..n).map(|i| graph.position(i as u32)).collect();
     variables.extend((0..n).map(|i| graph.velocity(i as u32)));
     variables.push(graph.action());

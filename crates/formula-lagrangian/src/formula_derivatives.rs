@@ -4,8 +4,7 @@ use crate::derived::Derived;
 use crate::drag::ProvedForce;
 use crate::evaluation::At;
 use crate::{Formula, FormulaError};
-use contact_geom::nalgebra::{DMatrix, DVector, SVector};
-use contact_geom::support::KernelDual;
+use contact_geom::nalgebra::{DMatrix, DVector};
 use contact_geom::switching::BreakRate;
 use contact_geom::{Arguments, Scalar, ScalarSystem, Slopes, Structure};
 
@@ -203,8 +202,17 @@ impl ScalarSystem for FormulaDerivatives {
     }
 
     #[inline(always)]
-    fn second_derivatives<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, mut to: [&mut [T]; 6]) {
-        self.derived.second.evaluate::<T, N>(At { t, q, v, z }, &mut to);
+    fn with_second_derivatives<T: Scalar, const N: usize>(
+        &self,
+        Arguments { t, q, v, z }: Arguments<'_, T>,
+        to: Slopes<'_, T>,
+        [qq, qv, vv, qz, vz, zz]: [&mut [T]; 6],
+    ) -> T {
+        let mut value = T::zero();
+        let (l_z, l) = (std::slice::from_mut(to.z), std::slice::from_mut(&mut value));
+        let results = &mut [to.q, to.v, l_z, l, qq, qv, vv, qz, vz, zz];
+        self.derived.with_second.evaluate::<T, N>(At { t, q, v, z }, results);
+        value
     }
 
     fn parameters(&self) -> Option<usize> {
@@ -213,29 +221,17 @@ impl ScalarSystem for FormulaDerivatives {
 
     /// Where the base of a power is not positive, its derivative with respect to a parameter in the exponent is taken to
     /// be 0; so are those of jumps.
+    #[inline(always)]
     fn explicit<T: Scalar>(&self, of: Option<usize>, at: Arguments<'_, T>, to: Slopes<'_, T>, force: &mut [T]) -> T {
-        type Along<T> = KernelDual<T, SVector<T, 1>>;
-        let moving = |x: T, is: bool| {
-            let mut along = Along::<T>::constant(x);
-            along.d[0] = T::from(f64::from(u8::from(is)));
-            along
-        };
-        let still = |x: &[T]| -> Vec<Along<T>> { x.iter().map(|x| Along::<T>::constant(*x)).collect() };
-        let theta = self.derived.formula.values.iter().enumerate();
-        let theta: Vec<_> = theta.map(|(k, x)| moving(T::from(*x), of == Some(k))).collect();
-        let (q, v) = (still(at.q), still(at.v));
-        let at = At { q: &q, v: &v, z: Along::<T>::constant(at.z), t: moving(at.t, of.is_none()) };
-        let mut found = vec![Along::<T>::constant(T::zero()); 2 * self.n + 2];
-        self.derived.parametric_gradient.evaluate(&theta, at, &mut found);
-        let mut found = found.iter().map(|x| x.d[0]);
-        for to in to.q.iter_mut().chain(to.v).chain([to.z]) {
-            *to = found.next().unwrap_or_else(|| T::from(f64::NAN));
+        let Arguments { t, q, v, z } = at;
+        let mut value = T::from(f64::NAN);
+        let to = &mut [to.q, to.v, std::slice::from_mut(to.z), std::slice::from_mut(&mut value), force];
+        if let Some(tape) = self.derived.explicit(of) {
+            tape.evaluate::<T, 0>(At { t, q, v, z }, to);
+        } else {
+            to.iter_mut().for_each(|to| to.fill(T::from(f64::NAN)));
         }
-        let mut applied = vec![Along::<T>::constant(T::zero()); self.derived.parametric_force.len()];
-        self.derived.parametric_force.evaluate(&theta, at, &mut applied);
-        let mut applied = applied.iter().map(|f| f.d[0]);
-        force.iter_mut().for_each(|to| *to = applied.next().unwrap_or_else(T::zero));
-        found.next().unwrap_or_else(|| T::from(f64::NAN))
+        value
     }
 
     #[inline(always)]

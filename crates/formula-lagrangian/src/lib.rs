@@ -143,6 +143,7 @@ mod derived_reset;
 mod drag;
 mod error;
 mod evaluation;
+mod explicit;
 mod expression;
 mod expression_gradient;
 mod forces;

@@ -193,6 +193,22 @@ impl Tape {
     }
 }
 
+impl Tape {
+    /// The nodes of its constants.
+    pub fn constants(&self) -> Vec<Id> {
+        self.constants.iter().map(|(_, source)| *source).collect()
+    }
+
+    /// Sets the constants, whose values are in the order of [`constants`](Self::constants).
+    pub fn set_constants_in_order(&mut self, values: &[f64]) {
+        for ((instruction, _), value) in self.constants.iter().zip(values) {
+            if let Some(instruction) = self.code.get_mut(*instruction) {
+                instruction.extra = value.to_bits();
+            }
+        }
+    }
+}
+
 impl Builder<'_> {
     /// Emits the code for a node and for all nodes on which it depends, without recursion. Operands come before the
     /// nodes that read them.

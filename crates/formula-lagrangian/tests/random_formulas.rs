@@ -1,8 +1,9 @@
 //! Random formulas: derivatives compared with dual numbers, and proved properties with numerical checks.
 
 use crate::random::Random;
-use contact_geom::VelocityPoint;
-use formula_lagrangian::{Formula, FormulaLagrangian};
+use contact_geom::nalgebra::SVector;
+use contact_geom::{Arguments, Dual, Parametric, ScalarSystem, Slopes, VelocityPoint};
+use formula_lagrangian::{Formula, FormulaDerivatives, FormulaLagrangian};
 
 impl Random {
     fn number(&mut self) -> f64 {
@@ -139,4 +140,67 @@ fn smooth_formulas() {
 fn formulas_with_kinks() {
     let [compared, claims, count] = compare(0x5851_f42d_4c95_7f2d, 30_000, true);
     assert!(compared > count * 8 / 10 && claims > count / 2, "{compared} {claims} of {count}");
+}
+
+/// The derivatives in a parameter, or in the time: of `L_q`, `L_v`, `L_z`, L and the force.
+fn explicit(l: &FormulaDerivatives, of: Option<usize>, t: f64, x: &VelocityPoint<2>) -> Vec<f64> {
+    let (mut q, mut v, mut z, mut force) = ([0.0; 2], [0.0; 2], 0.0, [0.0; 2]);
+    let (at, to) =
+        (Arguments { t, q: x.q.as_slice(), v: x.v.as_slice(), z: x.z }, Slopes { q: &mut q, v: &mut v, z: &mut z });
+    let value = l.explicit(of, at, to, &mut force);
+    [&q[..], &v, &[z, value], &force].concat()
+}
+
+/// The same by nested dual numbers.
+fn explicit_by_duals(l: &FormulaLagrangian<2>, of: Option<usize>, t: f64, x: &VelocityPoint<2>) -> Vec<f64> {
+    type Inner = Dual<f64, SVector<f64, 5>>;
+    type Outer = Dual<Inner, SVector<Inner, 1>>;
+    let number = |re: f64, k: Option<usize>, moves: bool| -> Outer {
+        let inner = Inner { re, d: SVector::from_fn(|i, _| f64::from(u8::from(Some(i) == k))) };
+        Outer { re: inner, d: SVector::from([Inner { re: f64::from(u8::from(moves)), d: SVector::zeros() }]) }
+    };
+    let theta: Vec<Outer> = l.parameters().iter().enumerate().map(|(k, x)| number(*x, None, of == Some(k))).collect();
+    let q = SVector::from([number(x.q[0], Some(0), false), number(x.q[1], Some(1), false)]);
+    let v = SVector::from([number(x.v[0], Some(2), false), number(x.v[1], Some(3), false)]);
+    let at = VelocityPoint { q, v, z: number(x.z, Some(4), false) };
+    let t = number(t, None, of.is_none());
+    let (value, force) = (l.value_at(&theta, t, &at.q, &at.v, at.z).d[0], l.force_at(&theta, t, &at));
+    value.d.iter().copied().chain([value.re, force[0].d[0].re, force[1].d[0].re]).collect()
+}
+
+/// Derivatives in parameters and time are those by nested dual numbers, also after the parameters are set. Both sum terms
+/// that may cancel, whose size is not known here: that of the largest derivative stands for it, with a margin.
+#[test]
+fn derivatives_in_parameters_and_time() {
+    let (mut random, mut compared, mut worst) = (Random(0x1234_5678_9abc_def1), 0, 0.0_f64);
+    for _ in 0..10_000 {
+        let kinks = random.below(3) == 0;
+        let force = random.expression(2, &["x", "y'", "z", "t", "a", "b"], kinks);
+        let text = format!("force[x] = {force}; {} + b*a^(x/4)*y", random.lagrangian(kinks));
+        let formula = Formula::parse(&text, &["x", "y"], &[("a", 1.25), ("b", -0.5)]).unwrap();
+        let (l, derivatives) = (formula.lagrangian::<2>().unwrap(), formula.derivatives().unwrap());
+        let mut coordinate = || 2.0 * random.number() - 1.3;
+        let x = VelocityPoint::new([coordinate(), coordinate()], [coordinate(), coordinate()], coordinate());
+        let (t, theta) = (coordinate(), [0.5 + coordinate().abs(), coordinate()]);
+        for of in [Some(0), Some(1), None] {
+            // The tapes exist when the parameters are set.
+            explicit(&derivatives, of, t, &x);
+            let found = explicit(&derivatives.with_parameters(&theta).unwrap(), of, t, &x);
+            let expected = explicit_by_duals(&l.with_parameters(&theta).unwrap(), of, t, &x);
+            let size = expected.iter().fold(1.0, |size: f64, x| if x.is_nan() { f64::NAN } else { size.max(x.abs()) });
+            if !(size < 1e6) {
+                continue;
+            }
+            compared += 1;
+            for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
+                worst = worst.max((a - b).abs() / size);
+                assert!(
+                    (a - b).abs() <= 64.0 * f64::EPSILON * size,
+                    "{text}\n in {of:?} at t = {t}, {x:?}, {theta:?}: {i}: {a}, not {b}"
+                );
+            }
+        }
+    }
+    println!("largest difference: {worst:e}");
+    assert!(compared > 25_000, "{compared}");
 }

@@ -89,20 +89,24 @@ fn losses_of_rows() {
     }
 }
 
-/// Many blocks of steps, with states kept at intervals, and a run from which gradients are taken more than once.
+/// A run whose stages are kept and one that has too many, of which states are kept at intervals; from each of them gradients
+/// are taken more than once.
 #[test]
 fn long_runs() {
     let system = OneCoordinate::from(Pendulum { gamma: -0.02 });
     let problem = Problem::new(&system, 0.0, VelocityPoint::new([1.0], [0.3], 0.0)).unwrap();
-    let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(1000));
-    let recorded = run().record(Until::Time(100.0)).unwrap();
-    assert_eq!(recorded.outcome().status, Status::Completed);
-    let covector = EndCovector { q: [1.0].into(), ..EndCovector::zero(1) };
-    let gradient = recorded.pullback(&covector).unwrap();
-    assert_eq!(gradient, recorded.pullback(&covector).unwrap());
-    let tangent = run().tangent(&Variable::all(&problem), Until::Time(100.0)).unwrap();
-    for (found, column) in all(&gradient).into_iter().zip(&tangent.columns) {
-        assert!((found - column.q[0]).abs() <= 1e-11 * (1.0 + found.abs()), "{found} and {}", column.q[0]);
+    for steps in [1000, 250_000] {
+        let run = || problem.by(GaussCollocation { stages: 4 }).steps(Steps::Count(steps));
+        let recorded = run().record(Until::Time(100.0)).unwrap();
+        assert_eq!(recorded.outcome().status, Status::Completed);
+        let covector = EndCovector { q: [1.0].into(), ..EndCovector::zero(1) };
+        let gradient = recorded.pullback(&covector).unwrap();
+        assert_eq!(gradient, recorded.pullback(&covector).unwrap());
+        let tangent = run().tangent(&Variable::all(&problem), Until::Time(100.0)).unwrap();
+        for (found, column) in all(&gradient).into_iter().zip(&tangent.columns) {
+            let expected = column.q[0];
+            assert!((found - expected).abs() <= 1e-11 * (1.0 + found.abs()), "{steps} steps: {found} and {expected}");
+        }
     }
     assert_eq!(system.parameter_names(), ["gamma"]);
 }

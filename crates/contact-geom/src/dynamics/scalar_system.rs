@@ -23,9 +23,15 @@ pub trait ScalarSystem {
     /// `W = L_vv`, by columns.
     fn mass_matrix<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: &mut [T]);
 
-    /// Writes the second derivatives `L_qq`, `L_qv`, `L_vv`, `L_qz`, `L_vz`, `L_zz`, in this order: matrices of n × n entries by
-    /// columns (in `L_qv` the rows belong to q), vectors of n entries, and one number.
-    fn second_derivatives<T: Scalar, const N: usize>(&self, t: T, q: &[T], v: &[T], z: T, to: [&mut [T]; 6]);
+    /// The value with the gradient, as [`with_gradient`](Self::with_gradient), and the second derivatives `L_qq`, `L_qv`, `L_vv`,
+    /// `L_qz`, `L_vz`, `L_zz`, which are written in this order: matrices of n × n entries by columns (in `L_qv` the rows belong
+    /// to q), vectors of n entries, and one number.
+    fn with_second_derivatives<T: Scalar, const N: usize>(
+        &self,
+        at: Arguments<'_, T>,
+        to: Slopes<'_, T>,
+        second: [&mut [T]; 6],
+    ) -> T;
 
     /// The number of parameters, where [`explicit`](Self::explicit) has the derivatives in them and in time. `None`, the
     /// default: these are found by differences.

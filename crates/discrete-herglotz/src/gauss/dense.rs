@@ -80,15 +80,19 @@ impl Solved<'_> {
             }
             v[s..].fill(0.0);
         }
-        for i in 0..s {
-            let rho = 1.0 / table.inverse_rho.0[i];
-            for d in 0..n {
-                let entry = |e: usize| mass.map_or(f64::from(u8::from(d == e)), |mass| mass[(d, e)]);
-                self.force[d].0[i] =
-                    (0..n).map(|e| entry(e) * (rho * a[e].0[i])).reduce(|sum, term| sum + term).unwrap_or(0.0);
+        let mut rho = table.inverse_rho;
+        rho.0[..s].iter_mut().for_each(|rho| *rho = 1.0 / *rho);
+        rho.0[s..].fill(0.0);
+        for d in 0..n {
+            for e in 0..n {
+                let entry = mass.map_or(f64::from(u8::from(d == e)), |mass| mass[(d, e)]);
+                if entry != 0.0 {
+                    let sums = self.force[d].0.iter_mut().zip(&rho.0).zip(&a[e].0);
+                    sums.for_each(|((sum, rho), a)| *sum += entry * (rho * a));
+                }
             }
-            self.rate.0[i] = rho * table.gamma;
         }
+        self.rate.0.iter_mut().zip(&rho.0).for_each(|(rate, rho)| *rate = rho * table.gamma);
         if wants_l && table.gamma != 0.0 {
             // So far the values are those of `L - gamma z`; this adds `gamma z`.
             let (actions, values) = (table.actions(), *self.l);

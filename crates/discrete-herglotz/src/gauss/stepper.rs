@@ -161,12 +161,22 @@ impl<'a> GaussStepper<'a> {
     /// The stages of the last step, with the values of L if they are requested or known.
     fn solved(&self, wants_l: bool) -> Option<SolvedStages> {
         let zeros = || StageVectors::from_elem(Stages::ZERO, self.system.dimension());
-        let (mut v, mut force) = (zeros(), zeros());
-        let (mut rate, mut l) = (Stages::ZERO, Stages::ZERO);
-        let to = Solved { v: &mut v, force: &mut force, rate: &mut rate, l: &mut l };
-        let (knows_l, t, from) = self.steps.solved(&*self.system, wants_l, to)?;
-        let (s, h, start) = (self.steps.s, self.steps.h, self.phase(&from.q, &from.y, from.z));
-        Some(SolvedStages { s, t, h, start, v, force, rate, l, knows_l })
+        // Written in place: stages are long to move.
+        let mut solved = SolvedStages {
+            s: self.steps.s,
+            t: 0.0,
+            h: self.steps.h,
+            start: State::default(),
+            v: zeros(),
+            force: zeros(),
+            rate: Stages::ZERO,
+            l: Stages::ZERO,
+            knows_l: false,
+        };
+        let SolvedStages { v, force, rate, l, .. } = &mut solved;
+        let (knows_l, t, from) = self.steps.solved(&*self.system, wants_l, Solved { v, force, rate, l })?;
+        (solved.knows_l, solved.t, solved.start) = (knows_l, t, self.phase(&from.q, &from.y, from.z));
+        Some(solved)
     }
 
     /// The phase point of a state in the variables of the route.

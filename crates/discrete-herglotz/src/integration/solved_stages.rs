@@ -40,4 +40,36 @@ impl SolvedStages {
     pub fn stages(&self) -> usize {
         self.s
     }
+
+    /// The number of numbers in the stages of n coordinates.
+    pub(crate) fn size(s: usize, n: usize) -> usize {
+        3 + 2 * n + 2 * (n + 1) * s
+    }
+
+    /// Appends all numbers that steps of one kind do not have in common.
+    pub(crate) fn append_to(&self, to: &mut Vec<f64>) {
+        let SolvedStages { s, t, h, start, v, force, rate, l, .. } = self;
+        to.extend([*t, *h, start.z]);
+        to.extend_from_slice(&start.q);
+        to.extend_from_slice(&start.p);
+        for of in v.iter().chain(force).chain([rate, l]) {
+            to.extend_from_slice(&of.0[..*s]);
+        }
+    }
+
+    /// Takes numbers that [`append_to`](Self::append_to) has appended, of a step of the same kind.
+    pub(crate) fn set(&mut self, from: &[f64]) {
+        let SolvedStages { s, t, h, start, v, force, rate, l, .. } = self;
+        let mut numbers = from;
+        let mut next = |to: &mut [f64]| {
+            if let Some((first, rest)) = numbers.split_at_checked(to.len()) {
+                to.copy_from_slice(first);
+                numbers = rest;
+            }
+        };
+        [t, h, &mut start.z].into_iter().for_each(|to| next(std::slice::from_mut(to)));
+        next(&mut start.q);
+        next(&mut start.p);
+        v.iter_mut().chain(force).chain([rate, l]).for_each(|of| next(&mut of.0[..*s]));
+    }
 }

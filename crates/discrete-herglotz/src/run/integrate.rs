@@ -26,7 +26,8 @@ pub(crate) fn integrate(
     run.start();
     while run.status.is_none() && !run.over {
         let first = run.taken;
-        let before = run.needs_start().then(|| (run.stepper.time(), run.stepper.state()));
+        let seen = run.seen.take();
+        let before = run.needs_start().then(|| seen.unwrap_or_else(|| (run.stepper.time(), run.stepper.state())));
         if let Err(cause) = run.advance() {
             run.fail(cause);
             break;
@@ -67,6 +68,8 @@ pub(super) struct Integration<'r, 'p, 'o> {
     pub taken: usize,
     /// The end of a trial run that took the same steps, if nothing between is observed or checked.
     known_end: Option<Box<dyn Stepper + 'p>>,
+    /// The time and the state after the last step, if observers have seen it.
+    seen: Option<(f64, State)>,
     /// Whether the last step has been taken.
     over: bool,
     /// If the motion has come to rest, the time until which observers have seen it.
@@ -121,6 +124,7 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
             checks,
             taken,
             known_end,
+            seen: None,
             over,
             rested_until,
             status: None,
@@ -211,6 +215,7 @@ impl<'r, 'p, 'o> Integration<'r, 'p, 'o> {
             {
                 self.checks.findings.log_factor = there;
             }
+            self.seen = Some((end.t, end.state));
             self.stop(stop);
         }
     }

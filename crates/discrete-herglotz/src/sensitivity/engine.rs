@@ -43,7 +43,7 @@ impl<'a> Engine<'a> {
     pub fn new(problem: &Differentiable<'a>, s: usize, h: f64, direction: Direction) -> Self {
         let (n, structure) = (problem.dimension(), &problem.problem.structure);
         let at = StageDerivatives::new(problem);
-        let velocity_terms = !at.form.separable || problem.system().hints().forced;
+        let velocity_terms = !at.form.separable || problem.system().has_force();
         let condenses = !velocity_terms && at.form.affine && structure.has_constant_rate();
         Engine {
             forward: StepMaps::new(s, h, Direction::Forward),
@@ -168,7 +168,7 @@ impl<'a> Engine<'a> {
             }
         }
         if column.warm {
-            extrapolate::<S>(&self.maps, &mut column.rates, [1.0, 1.0 / self.at.end_rho]);
+            extrapolate::<S>(&self.maps, self.linear.is_condensed(), &mut column.rates, [1.0, 1.0 / self.at.end_rho]);
         }
         self.linear.solve::<S>(&self.maps, &self.given, &mut column.rates)?;
         let (rates, maps) = (&column.rates, &self.maps);
@@ -239,7 +239,7 @@ impl<'a> Engine<'a> {
         given.r = Stages([covector.z; MAX_STAGES]);
         given.has_r = covector.z != 0.0;
         if covector.warm {
-            extrapolate::<S>(&self.maps, &mut covector.rates, [1.0 / rho, 1.0]);
+            extrapolate::<S>(&self.maps, self.linear.is_condensed(), &mut covector.rates, [1.0 / rho, 1.0]);
         }
         self.linear.solve::<S>(&self.maps, &self.given, &mut covector.rates)?;
         self.add_derivatives::<S>(step, k, covector);
@@ -337,13 +337,14 @@ impl WithSimd for Pull<'_, '_> {
 }
 
 /// Takes the polynomials of the rates over one step as the initial guess of the next one, with the factors of (v, z')
-/// and of r'.
+/// and of (P', r'): of P' where the equations are condensed, else of the others, from which P' follows.
 #[inline(always)]
-fn extrapolate<S: Simd>(maps: &StepMaps, rates: &mut StageTangent, [of_motion, of_r]: [f64; 2]) {
-    for (v, p_rate) in rates.v.iter_mut().zip(&mut rates.p_rate) {
-        extrapolate_rates::<S>(maps, v, of_motion);
-        extrapolate_rates::<S>(maps, p_rate, of_r);
+fn extrapolate<S: Simd>(maps: &StepMaps, condensed: bool, rates: &mut StageTangent, [of_motion, of_r]: [f64; 2]) {
+    if condensed {
+        rates.p_rate.iter_mut().for_each(|p_rate| extrapolate_rates::<S>(maps, p_rate, of_r));
+        return;
     }
+    rates.v.iter_mut().for_each(|v| extrapolate_rates::<S>(maps, v, of_motion));
     extrapolate_rates::<S>(maps, &mut rates.z_rate, of_motion);
     extrapolate_rates::<S>(maps, &mut rates.r_rate, of_r);
 }

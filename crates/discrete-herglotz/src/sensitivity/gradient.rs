@@ -55,8 +55,9 @@ pub struct LossGradient {
 
 /// A run that was performed and of which gradients can be computed, any number of them.
 ///
-/// The memory does not grow with the number of steps: states are kept at intervals, and the steps between them are taken
-/// again, so that the stages are bitwise those of the run.
+/// The stages of collocation steps are kept as long as they take at most 32 MiB. Of other runs states are kept at intervals, and the steps
+/// between them are taken again, so that the stages are bitwise those of the run and the memory does not grow with the number
+/// of steps.
 pub struct RecordedRun<'p> {
     problem: Differentiable<'p>,
     plan: Plan<'p>,
@@ -117,8 +118,8 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         let problem = run.problem.differentiable();
         let plan = run.plan(until)?;
         // An integrator without a tangent is refused before the run.
-        StepTangent::new(&problem, &plan.steps, Direction::Backward)?;
-        let mut kept = KeptStates::new();
+        let has_stages = StepTangent::new(&problem, &plan.steps, Direction::Backward)?.has_stages();
+        let mut kept = KeptStates::new(has_stages);
         let outcome = run.observed(&plan, &mut kept)?;
         Ok(RecordedRun { problem, plan, outcome, kept })
     }
@@ -160,8 +161,9 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         let problem = run.problem.differentiable();
         let plan = run.plan(until)?;
         // An integrator without a tangent is refused before the run.
-        StepTangent::new(&problem, &plan.steps, Direction::Backward)?;
-        let mut both = (KeptStates::new(), Rows::at(times.iter().copied())?.with_velocity());
+        let has_stages = StepTangent::new(&problem, &plan.steps, Direction::Backward)?.has_stages();
+        let kept = KeptStates::new(has_stages);
+        let mut both = (kept, Rows::at(times.iter().copied())?.with_velocity());
         let outcome = run.observed(&plan, &mut both)?;
         let (kept, rows) = both;
         if outcome.status != Status::Completed {
@@ -267,17 +269,10 @@ impl RecordedRun<'_> {
         if let (Some(from), Some(first)) = (self.outcome.rests_from, all.first_mut()) {
             rows.add_at_rest(from, &end, first).map_err(|cause| failed(self.outcome.steps, cause))?;
         }
-        let mut stepper = self.plan.stepper()?;
         let mut of_parts = PartCovectors { problem, steps, jumps: &jumps, tangent: RowTangent::new() };
-        let mut block: Vec<TakenStep> = Vec::with_capacity(BLOCK);
-        let mut work = |stepper: &mut dyn Stepper, range: Range<usize>| {
-            block.clear();
-            for k in range.clone() {
-                let before = (stepper.time(), stepper.state());
-                stepper.advance(1).map_err(|failure| failed(k, failure.cause))?;
-                block.push(engine.taken(&*stepper, steps.h, before).ok_or_else(|| no_tangent(&self.plan, ""))?);
-            }
-            for (k, step) in range.zip(&block).rev() {
+        let has_stages = engine.has_stages();
+        let mut pull_back = |range: Range<usize>, block: &[TakenStep]| {
+            for (k, step) in range.zip(block).rev() {
                 match step {
                     TakenStep::Whole(step) => {
                         engine.pull(step, k, &mut all).map_err(|cause| failed(k, cause))?;
@@ -291,8 +286,24 @@ impl RecordedRun<'_> {
             }
             Ok(())
         };
-        for (range, words) in self.kept.backward() {
-            for_each_block(&mut *stepper, range, words, &mut work, &failed)?;
+        if let Some(stages) = self.kept.stages() {
+            stages.for_each_backward(|k, step| pull_back(k..k + 1, std::slice::from_ref(step)))?;
+        } else {
+            let mut stepper = self.plan.stepper()?;
+            let mut block: Vec<TakenStep> = Vec::with_capacity(BLOCK);
+            let mut work = |stepper: &mut dyn Stepper, range: Range<usize>| {
+                block.clear();
+                for k in range.clone() {
+                    let before = (stepper.time(), stepper.state());
+                    stepper.advance(1).map_err(|failure| failed(k, failure.cause))?;
+                    let step = TakenStep::last_of(&*stepper, has_stages, steps.h, before);
+                    block.push(step.ok_or_else(|| no_tangent(&self.plan, ""))?);
+                }
+                pull_back(range, &block)
+            };
+            for (range, words) in self.kept.backward() {
+                for_each_block(&mut *stepper, range, words, &mut work, &failed)?;
+            }
         }
         let taken = self.outcome.steps;
         let gradients = all.iter().zip(explicit_times);

@@ -1,7 +1,9 @@
-//! States kept along a run, from which its steps are taken again.
+//! What is kept along a run for its gradients: the stages of its steps, or states from which these are taken again.
 
-use crate::run::{Observer, OutputRequest, StepView, Stop};
-use crate::{StepError, Stepper};
+use crate::integration::{SolvedStages, WholeStep};
+use crate::run::{Observer, OutputRequest, RunInfo, StepView, Stop};
+use crate::sensitivity::step_tangent::TakenStep;
+use crate::{InputError, StepError, Stepper};
 use std::ops::{ControlFlow, Range};
 
 /// The number of steps whose stages are in memory at once.
@@ -10,19 +12,75 @@ pub(crate) const BLOCK: usize = 64;
 /// The largest number of states that are kept.
 const MAX_KEPT: usize = 512;
 
-/// Keeps the state of the stepper at multiples of an interval of steps. The interval is doubled when there are
-/// too many states, so that the memory is bounded for any number of steps.
+/// The most numbers that are kept of the stages of all steps: 32 MiB.
+const MOST_NUMBERS: usize = 1 << 22;
+
+/// Keeps the stages of collocation steps as long as they take little memory, and the state of the stepper at multiples of an
+/// interval of steps. The interval is doubled when there are too many states, so that the memory is bounded for any number of
+/// steps.
 pub(crate) struct KeptStates {
     interval: usize,
     /// The saved words of the stepper after `interval * i` steps.
     states: Vec<Vec<u64>>,
     /// The number of steps taken.
     taken: usize,
+    /// The expected number of steps, 0 if it is not known.
+    expected: usize,
+    stages: Option<KeptStages>,
+}
+
+/// The stages of the steps of a run.
+#[derive(Default)]
+pub(crate) struct KeptStages {
+    /// The first step, whose kind all of them have.
+    first: Option<SolvedStages>,
+    numbers: Vec<f64>,
+}
+
+impl KeptStages {
+    /// Keeps a step of a run with an expected number of steps; `false` if it is of another kind than those before, or if there
+    /// are too many.
+    fn keep(&mut self, step: &SolvedStages, expected: usize) -> bool {
+        let (s, n) = (step.s, step.start.q.len());
+        let size = SolvedStages::size(s, n);
+        let all = expected.saturating_mul(size).max(self.numbers.len() + size);
+        let first = self.first.get_or_insert_with(|| step.clone());
+        if all > MOST_NUMBERS || (first.s, first.start.q.len(), first.knows_l) != (s, n, step.knows_l) {
+            return false;
+        }
+        self.numbers.reserve(all - self.numbers.len());
+        step.append_to(&mut self.numbers);
+        true
+    }
+
+    /// Calls a function with each step and its number, from the last to the first.
+    ///
+    /// # Errors
+    /// Those of the function.
+    pub fn for_each_backward<E>(&self, mut f: impl FnMut(usize, &TakenStep) -> Result<(), E>) -> Result<(), E> {
+        let Some(first) = &self.first else { return Ok(()) };
+        let size = SolvedStages::size(first.s, first.start.q.len());
+        let mut step = TakenStep::Whole(WholeStep::Collocation(first.clone()));
+        for (k, numbers) in self.numbers.chunks_exact(size).enumerate().rev() {
+            if let TakenStep::Whole(WholeStep::Collocation(stages)) = &mut step {
+                stages.set(numbers);
+            }
+            f(k, &step)?;
+        }
+        Ok(())
+    }
 }
 
 impl KeptStates {
-    pub fn new() -> Self {
-        KeptStates { interval: BLOCK, states: Vec::new(), taken: 0 }
+    /// Nothing so far, with stages if the steps have some.
+    pub fn new(has_stages: bool) -> Self {
+        let stages = has_stages.then(KeptStages::default);
+        KeptStates { interval: BLOCK, states: Vec::new(), taken: 0, expected: 0, stages }
+    }
+
+    /// The stages of all steps, if they were kept.
+    pub fn stages(&self) -> Option<&KeptStages> {
+        self.stages.as_ref()
     }
 
     /// The intervals of steps between kept states, each with the state at its start, from the last to the first.
@@ -34,6 +92,14 @@ impl KeptStates {
             .rev()
             .map(move |(i, words)| (steps(i), words.as_slice()))
             .filter(|(r, _)| !r.is_empty())
+    }
+
+    fn keep_stages(&mut self, at: &StepView<'_>) {
+        let Some(stages) = &mut self.stages else { return };
+        let step = at.stepper.solved_stages();
+        if !step.as_ref().is_some_and(|step| stages.keep(step, self.expected)) {
+            self.stages = None;
+        }
     }
 
     fn keep(&mut self, at: &StepView<'_>) {
@@ -59,8 +125,13 @@ impl Observer for KeptStates {
         OutputRequest { saved: true, ..OutputRequest::ACTION }
     }
 
+    fn prepare(&mut self, info: &RunInfo) -> Result<(), InputError> {
+        self.expected = info.count.unwrap_or(0);
+        Ok(())
+    }
+
     fn next(&self, taken: usize) -> usize {
-        (taken / self.interval + 1) * self.interval
+        if self.stages.is_some() { taken + 1 } else { (taken / self.interval + 1) * self.interval }
     }
 
     fn start(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
@@ -69,6 +140,7 @@ impl Observer for KeptStates {
     }
 
     fn step(&mut self, at: &StepView<'_>) -> ControlFlow<Stop> {
+        self.keep_stages(at);
         self.keep(at);
         ControlFlow::Continue(())
     }

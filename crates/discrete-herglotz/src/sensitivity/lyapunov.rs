@@ -8,7 +8,7 @@ use crate::sensitivity::columns::Column;
 use crate::sensitivity::parametric_system::DifferentiableProblem;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::step_tangent::StepTangent;
+use crate::sensitivity::step_tangent::{StepTangent, TakenStep};
 use crate::sensitivity::stretching::Stretching;
 use crate::sensitivity::tangent::no_tangent;
 use crate::{InputError, State, Vector};
@@ -82,7 +82,7 @@ impl Frame<'_, '_> {
     fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let before = std::mem::replace(&mut self.before, (at.t, at.state.clone()));
-        let step = self.carried.engine.taken(at.stepper, self.plan.step_size(), before);
+        let step = TakenStep::last_of(at.stepper, self.carried.engine.has_stages(), self.plan.step_size(), before);
         let step = step.ok_or_else(|| no_tangent(self.plan, ""))?;
         let failed = |cause| SensitivityError::Step { step: k, cause };
         self.carried.push(&step, at.t, k)?;

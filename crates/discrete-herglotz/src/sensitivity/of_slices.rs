@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use crate::gauss::limits::MAX_DIMENSION_IN_LANES;
-use crate::gauss::system::{Coordinates, KernelsOf, zeros};
+use crate::gauss::system::KernelsOf;
 use crate::integration::SolvedStages;
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
@@ -19,9 +19,8 @@ use crate::system::caught;
 use crate::{Kernels, Point, StepError, System, Vector};
 use contact_geom::nalgebra::{DMatrixViewMut, DVectorViewMut, SVector};
 use contact_geom::support::{KernelDual, linear};
-use contact_geom::{Arguments, Scalar, ScalarSystem, SlicesVisitor, Slopes};
+use contact_geom::{Arguments, ScalarSystem, SlicesVisitor, Slopes};
 use pulp::{Simd, WithSimd};
-use smallvec::SmallVec;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -157,28 +156,45 @@ impl<F: ScalarSystem> Quantities for SliceQuantities<F> {
     }
 }
 
-/// The derivatives in a quantity at a block of stages: of L, `L_q + f`, `L_v` and `L_z`.
-struct InQuantity<S: Simd> {
-    l: Lanes<S>,
-    q: Coordinates<Lanes<S>>,
-    v: Coordinates<Lanes<S>>,
-    z: Lanes<S>,
+/// The most numbers that [`registers!`] keeps on the stack.
+const FEW: usize = 32;
+
+/// Binds a name to this number of copies of a zero in registers, without memory on the heap if they are few. A function that
+/// returned them would copy them.
+macro_rules! registers {
+    ($name:ident, $zero:expr, $count:expr) => {
+        let (zero, count) = ($zero, $count);
+        let (mut few, mut many) = ([zero; FEW], Vec::new());
+        let $name = if count <= FEW {
+            &mut few[..count]
+        } else {
+            many.resize(count, zero);
+            &mut many[..]
+        };
+    };
 }
 
-impl<S: Simd> InQuantity<S> {
-    #[inline(always)]
-    fn of(slices: &impl ScalarSystem, quantity: Quantity, at: &StageDerivatives, r: usize) -> Self {
-        let (n, (q, v)) = (at.q.len(), point::<S>(at, r));
-        let (mut of_q, mut of_v, mut force) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n));
-        let mut of_z = Lanes::<S>::splat(0.0);
-        let to = Slopes { q: &mut of_q, v: &mut of_v, z: &mut of_z };
-        let arguments = Arguments { t: at.times.block(r), q: &q, v: &v, z: at.z.block(r) };
-        let l = slices.explicit(parameter(quantity), arguments, to, &mut force);
-        for d in 0..n {
-            of_q[d] += force[d];
-        }
-        InQuantity { l, q: of_q, v: of_v, z: of_z }
-    }
+/// Splits slices of the given lengths off the start of another, one after the other.
+macro_rules! split {
+    ($rest:ident, $($name:ident: $count:expr),*) => {
+        $(let ($name, $rest) = $rest.split_at_mut($count);)*
+        let _ = $rest;
+    };
+}
+
+/// The derivatives in a quantity at a block of stages: of L, which is returned, and of `L_q`, `L_v`, `L_z` and f, which are
+/// written to slices, as the force after the position and the velocity.
+#[inline(always)]
+fn in_quantity<S: Simd>(
+    slices: &impl ScalarSystem,
+    quantity: Quantity,
+    at: &StageDerivatives,
+    r: usize,
+    ([q, v, force], to): ([&mut [Lanes<S>]; 3], Slopes<'_, Lanes<S>>),
+) -> Lanes<S> {
+    set_point(at, r, [q, v]);
+    let arguments = Arguments { t: at.times.block(r), q, v, z: at.z.block(r) };
+    slices.explicit(parameter(quantity), arguments, to, force)
 }
 
 /// See [`Quantities::add_at_stages`].
@@ -196,16 +212,21 @@ impl<F: ScalarSystem> WithSimd for AddAtStages<'_, F> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let AddAtStages { slices, quantity, at, factors, to } = self;
+        let n = at.q.len();
+        registers!(all, Lanes::<S>::splat(0.0), 5 * n);
+        split!(all, q: n, v: n, force: n, of_q: n, of_v: n);
         for r in 0..blocks::<S>(at.s) {
-            let of = InQuantity::<S>::of(slices, quantity, at, r);
+            let mut of_z = Lanes::<S>::splat(0.0);
+            let slopes = Slopes { q: &mut *of_q, v: &mut *of_v, z: &mut of_z };
+            let l = in_quantity(slices, quantity, at, r, ([&mut *q, &mut *v, &mut *force], slopes));
             let factor = factors.block::<S>(r);
-            for d in 0..at.q.len() {
+            for d in 0..n {
                 let (v, p) = (&mut to.v_source[d], &mut to.p_source[d]);
-                v.set(r, factor.mul_add(of.v[d], v.block(r)));
-                p.set(r, factor.mul_add(of.q[d], p.block(r)));
+                v.set(r, factor.mul_add(of_v[d], v.block(r)));
+                p.set(r, factor.mul_add(of_q[d] + force[d], p.block(r)));
             }
-            to.z_source.set(r, factor.mul_add(of.l, to.z_source.block(r)));
-            to.r_source.set(r, factor.mul_add(of.z, to.r_source.block(r)));
+            to.z_source.set(r, factor.mul_add(l, to.z_source.block(r)));
+            to.r_source.set(r, factor.mul_add(of_z, to.r_source.block(r)));
         }
     }
 }
@@ -225,30 +246,33 @@ impl<F: ScalarSystem> WithSimd for QuantityAlong<'_, F> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> f64 {
         let QuantityAlong { slices, quantity, at, w, weights } = self;
+        let n = at.q.len();
+        registers!(all, Lanes::<S>::splat(0.0), 5 * n);
+        split!(all, q: n, v: n, force: n, of_q: n, of_v: n);
         let mut sum = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(at.s) {
-            let of = InQuantity::<S>::of(slices, quantity, at, r);
-            let mut along = of.z * w.z.block(r);
-            for d in 0..at.q.len() {
-                along = of.q[d].mul_add(w.q[d].block(r), along);
-                along = of.v[d].mul_add(w.v[d].block(r), along);
+            let mut of_z = Lanes::<S>::splat(0.0);
+            let slopes = Slopes { q: &mut *of_q, v: &mut *of_v, z: &mut of_z };
+            let l = in_quantity(slices, quantity, at, r, ([&mut *q, &mut *v, &mut *force], slopes));
+            let mut along = of_z * w.z.block(r);
+            for d in 0..n {
+                along = (of_q[d] + force[d]).mul_add(w.q[d].block(r), along);
+                along = of_v[d].mul_add(w.v[d].block(r), along);
             }
-            let along = w.r.block::<S>(r).mul_add(of.l, at.rho.block::<S>(r) * along);
+            let along = w.r.block::<S>(r).mul_add(l, at.rho.block::<S>(r) * along);
             sum = weights.block::<S>(r).mul_add(along, sum);
         }
         sum.sum()
     }
 }
 
-/// The position and the velocity at a block of stages.
+/// Copies the position and the velocity at a block of stages.
 #[inline(always)]
-fn point<S: Simd>(at: &StageDerivatives, r: usize) -> (Coordinates<Lanes<S>>, Coordinates<Lanes<S>>) {
-    let (mut q, mut v) = (Coordinates::new(), Coordinates::new());
-    for d in 0..at.q.len() {
-        q.push(at.q[d].block(r));
-        v.push(at.v[d].block(r));
+fn set_point<S: Simd>(at: &StageDerivatives, r: usize, [q, v]: [&mut [Lanes<S>]; 2]) {
+    for d in 0..q.len() {
+        q[d] = at.q[d].block(r);
+        v[d] = at.v[d].block(r);
     }
-    (q, v)
 }
 
 /// See [`ParametricSystem::evaluate_stages`].
@@ -290,29 +314,19 @@ impl<F: ScalarSystem> WithSimd for EvaluateStages<'_, F> {
     }
 }
 
-/// Numbers for each pair of coordinates, without memory on the heap for up to eight.
-type Pairs<T> = SmallVec<[T; 64]>;
-
-#[inline(always)]
-fn pairs<T: Scalar>(n: usize) -> Pairs<T> {
-    let mut all = Pairs::new();
-    for _ in 0..n * n {
-        all.push(T::zero());
-    }
-    all
-}
-
 impl StageDerivatives {
     /// Evaluates L with its derivatives at a block of stages; `false` where W is singular.
     #[inline(always)]
     fn take<S: Simd>(&mut self, slices: &impl ScalarSystem, r: usize) -> bool {
         let n = self.q.len();
-        let (t, (q, v), z) = (self.times.block::<S>(r), point::<S>(self, r), self.z.block::<S>(r));
-        let (mut l_q, mut l_v, mut l_z) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), Lanes::<S>::splat(0.0));
-        let l = slices.with_gradient::<_, 0>(t, &q, &v, z, Slopes { q: &mut l_q, v: &mut l_v, z: &mut l_z });
-        let (mut qq, mut qv, mut vv) = (pairs::<Lanes<S>>(n), pairs::<Lanes<S>>(n), pairs::<Lanes<S>>(n));
-        let (mut qz, mut vz, mut zz) = (zeros::<Lanes<S>>(n), zeros::<Lanes<S>>(n), [Lanes::<S>::splat(0.0)]);
-        slices.second_derivatives::<_, 0>(t, &q, &v, z, [&mut qq, &mut qv, &mut vv, &mut qz, &mut vz, &mut zz]);
+        let (t, z) = (self.times.block::<S>(r), self.z.block::<S>(r));
+        registers!(all, Lanes::<S>::splat(0.0), 7 * n + 4 * n * n);
+        split!(all, q: n, v: n, l_q: n, l_v: n, qz: n, vz: n, column: n, qq: n * n, qv: n * n, vv: n * n, copy: n * n);
+        set_point(self, r, [&mut *q, &mut *v]);
+        let (mut l_z, mut zz) = (Lanes::<S>::splat(0.0), [Lanes::<S>::splat(0.0)]);
+        let (at, to) = (Arguments { t, q, v, z }, Slopes { q: &mut *l_q, v: &mut *l_v, z: &mut l_z });
+        let second = [&mut *qq, &mut *qv, &mut *vv, &mut *qz, &mut *vz, &mut zz];
+        let l = slices.with_second_derivatives::<_, 0>(at, to, second);
         self.l.set(r, l);
         self.l_z.set(r, l_z);
         self.zz.set(r, zz[0]);
@@ -340,11 +354,11 @@ impl StageDerivatives {
             *w *= rho;
         }
         for j in 0..n {
-            let mut copy = vv.clone();
-            let mut column = zeros::<Lanes<S>>(n);
+            copy.copy_from_slice(vv);
+            column.fill(Lanes::splat(0.0));
             column[j] = Lanes::splat(1.0);
-            let mut w = DMatrixViewMut::from_slice(&mut copy, n, n);
-            if linear::solve_in_kernel(&mut w, &mut DVectorViewMut::from_slice(&mut column, n)).is_err() {
+            let mut w = DMatrixViewMut::from_slice(copy, n, n);
+            if linear::solve_in_kernel(&mut w, &mut DVectorViewMut::from_slice(column, n)).is_err() {
                 return false;
             }
             for i in 0..n {
@@ -359,23 +373,20 @@ impl StageDerivatives {
     fn take_force<S: Simd>(&mut self, slices: &impl ScalarSystem, r: usize) {
         type Along<S> = KernelDual<Lanes<S>, SVector<Lanes<S>, 1>>;
         let n = self.q.len();
-        let (t, (q, v), z) = (self.times.block::<S>(r), point::<S>(self, r), self.z.block::<S>(r));
+        let at = Along::<S>::constant;
+        let t = at(self.times.block::<S>(r));
+        registers!(all, at(Lanes::<S>::splat(0.0)), 3 * n + 1);
+        // The position, the velocity and the action.
+        split!(all, x: 2 * n + 1, force: n);
+        for d in 0..n {
+            (x[d], x[n + d]) = (at(self.q[d].block(r)), at(self.v[d].block(r)));
+        }
+        x[2 * n] = at(self.z.block(r));
         let Some(forces) = &mut self.force else { return };
         for j in 0..=2 * n {
-            let (mut at_q, mut at_v) = (Coordinates::<Along<S>>::new(), Coordinates::<Along<S>>::new());
-            for d in 0..n {
-                at_q.push(Along::<S>::constant(q[d]));
-                at_v.push(Along::<S>::constant(v[d]));
-            }
-            let mut at_z = Along::<S>::constant(z);
-            let seeded = match j {
-                j if j < n => &mut at_q[j],
-                j if j < 2 * n => &mut at_v[j - n],
-                _ => &mut at_z,
-            };
-            seeded.d[0] = Lanes::splat(1.0);
-            let mut force = zeros::<Along<S>>(n);
-            slices.applied_force::<_, 0>(Along::<S>::constant(t), &at_q, &at_v, at_z, &mut force);
+            x[j].d[0] = Lanes::splat(1.0);
+            slices.applied_force::<_, 0>(t, &x[..n], &x[n..2 * n], x[2 * n], force);
+            x[j].d[0] = Lanes::splat(0.0);
             for i in 0..n {
                 match j {
                     j if j < n => forces.q[(i, j)].set(r, force[i].d[0]),

@@ -86,7 +86,7 @@ impl StageDerivatives {
             qz: vector(),
             vz: vector(),
             zz: Stages::ZERO,
-            force: system.hints().forced.then(|| Box::new(force())),
+            force: system.has_force().then(|| Box::new(force())),
             form: Form {
                 separable: structure.separable,
                 affine: !depends_on_action(&**system, structure),

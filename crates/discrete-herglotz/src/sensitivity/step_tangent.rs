@@ -20,6 +20,21 @@ pub(crate) enum TakenStep {
 }
 
 impl TakenStep {
+    /// The last step of a stepper, which started at the given time and state, with the stages of collocation or without;
+    /// `None` where they are not known.
+    pub fn last_of(stepper: &dyn Stepper, has_stages: bool, h: f64, (t, start): (f64, State)) -> Option<Self> {
+        let parts = || {
+            let parts = stepper.last_step().map(|step| step.solved_parts());
+            parts.filter(|parts| !parts.is_empty()).map(TakenStep::Parts)
+        };
+        if has_stages {
+            let stages = stepper.solved_stages().map(|stages| TakenStep::Whole(WholeStep::Collocation(stages)));
+            return stages.or_else(parts);
+        }
+        let whole = || TakenStep::Whole(WholeStep::Flow(StepEnds { t, h, start, end: stepper.state() }));
+        Some(parts().unwrap_or_else(whole))
+    }
+
     /// The time at its start.
     pub fn start_time(&self) -> Option<f64> {
         match self {
@@ -84,23 +99,9 @@ impl<'a> StepTangent<'a> {
         }
     }
 
-    /// The last step of a stepper, which started at the given time and state; `None` where its stages are not known.
-    pub fn taken(&self, stepper: &dyn Stepper, h: f64, (t, start): (f64, State)) -> Option<TakenStep> {
-        let parts = || {
-            let parts = stepper.last_step().map(|step| step.solved_parts());
-            parts.filter(|parts| !parts.is_empty()).map(TakenStep::Parts)
-        };
-        match self {
-            StepTangent::Collocation(_) => match stepper.solved_stages() {
-                Some(stages) => Some(TakenStep::Whole(WholeStep::Collocation(stages))),
-                None => parts(),
-            },
-            StepTangent::Flow(_) => {
-                Some(parts().unwrap_or_else(|| {
-                    TakenStep::Whole(WholeStep::Flow(StepEnds { t, h, start, end: stepper.state() }))
-                }))
-            }
-        }
+    /// Whether it is that of the stages of collocation.
+    pub fn has_stages(&self) -> bool {
+        matches!(self, StepTangent::Collocation(_))
     }
 
     /// Why the steps are not differentiable in a parameter, if they are not.

@@ -7,7 +7,7 @@ use crate::sensitivity::columns::Column;
 use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProblem};
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
-use crate::sensitivity::step_tangent::StepTangent;
+use crate::sensitivity::step_tangent::{StepTangent, TakenStep};
 use crate::sensitivity::variable::Variable;
 use crate::sensitivity::velocity_dependence::VelocityDependence;
 use crate::sensitivity::{EndCovector, MotionState, SensitivityError};
@@ -88,7 +88,7 @@ impl Columns<'_, '_> {
     fn push(&mut self, at: &StepView<'_>) -> Result<(), SensitivityError> {
         let k = at.k.saturating_sub(1);
         let before = std::mem::replace(&mut self.before, (at.t, at.state.clone()));
-        let taken = self.carried.engine.taken(at.stepper, self.plan.step_size(), before);
+        let taken = TakenStep::last_of(at.stepper, self.carried.engine.has_stages(), self.plan.step_size(), before);
         let step = taken.ok_or_else(|| no_tangent(self.plan, ""))?;
         let largest = self.carried.push(&step, at.t, k)?;
         self.largest = max_or_nan(self.largest, largest);

@@ -134,7 +134,10 @@ impl System for ManyCoordinates {
         let mut to = SecondDerivatives { qq: square(), qv: square(), vv: square(), qz: line(), vz: line(), zz: 0.0 };
         let SecondDerivatives { qq, qv, vv, qz, vz, zz } = &mut to;
         let [qq, qv, vv] = [qq, qv, vv].map(|m| m.as_mut_slice());
-        self.0.second_derivatives::<f64, 0>(t, &x.q, &x.v, x.z, [qq, qv, vv, qz, vz, std::slice::from_mut(zz)]);
+        let mut first = Components::zeros(n);
+        let slopes = Slopes { q: &mut first.x, v: &mut first.y, z: &mut first.z };
+        let at = Arguments { t, q: &x.q[..], v: &x.v[..], z: x.z };
+        self.0.with_second_derivatives::<f64, 0>(at, slopes, [qq, qv, vv, qz, vz, std::slice::from_mut(zz)]);
         to
     }
     fn mass_matrix(&self, t: f64, x: &Point) -> DMatrix<f64> {

@@ -69,8 +69,10 @@ impl LinearStages {
             add(&mut rate, &p_source[d]);
             fixed[d] = rate;
         }
-        let (mut iteration, mut is_first) = (FixedPointIteration::until(1.0, 0.25), true);
-        loop {
+        let mut iteration = FixedPointIteration::until(1.0, 0.25);
+        // The first rates are a guess that does not belong to the positions before it.
+        let unchecked = 1 + std::mem::take(&mut self.unchecked);
+        for count in 1_u32.. {
             let (mut change, mut size) = (zero, zero);
             for d in 0..n {
                 let mut a = Stages::ZERO;
@@ -93,14 +95,17 @@ impl LinearStages {
                 }
                 x_p_rate[d] = rate;
             }
-            // The first rates are a guess that does not belong to the positions before it.
-            if std::mem::take(&mut is_first) {
+            if count <= unchecked {
                 continue;
             }
             let (change, size) = (change.reduce_max(), size.reduce_max());
             match iteration.assess(change, size) {
                 IterationOutcome::Continue => {}
-                IterationOutcome::Done => break,
+                IterationOutcome::Done => {
+                    // The next step converges as this one does: two changes show that it has.
+                    self.unchecked = count.saturating_sub(3);
+                    break;
+                }
                 _ => return false,
             }
         }

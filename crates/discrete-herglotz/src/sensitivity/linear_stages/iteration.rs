@@ -6,10 +6,10 @@
 use super::{Inhomogeneity, LinearStages, StageTangent, add, add_product, product, subtract_product};
 use crate::gauss::stages::fixed_point::{FixedPointIteration, IterationOutcome};
 use crate::gauss::tables::coefficients::MAX_STAGES;
-use crate::numbers::registers::Stages;
+use crate::numbers::lanes::Lanes;
+use crate::numbers::registers::{Stages, blocks};
 use crate::sensitivity::stage_derivatives::stage_values;
 use crate::sensitivity::step_maps::StepMaps;
-use contact_geom::numbers::max_or_nan;
 use pulp::Simd;
 
 /// The rates that an iteration determines.
@@ -34,14 +34,14 @@ impl LinearStages {
         loop {
             match iteration.assess(self.update::<S>(kinds, maps, Some(given), x), 1.0) {
                 IterationOutcome::Continue => {}
-                IterationOutcome::Done => return true,
+                IterationOutcome::Done => return x.is_finite::<S>(maps.s),
                 _ => return false,
             }
         }
     }
 
     /// Computes the values at the stages from the rates, and the rates from these values; without the inhomogeneous
-    /// terms, if none are given. Returns the largest change of a rate, relative to the size of the terms.
+    /// terms, if none are given. Returns the largest change of a rate, relative to the size of the terms; it may hide a NaN.
     #[inline(always)]
     pub(super) fn update<S: Simd>(
         &mut self,
@@ -103,18 +103,16 @@ impl LinearStages {
                 }
                 momentum[d] = of_v;
             }
-            let (mut change, mut size, mut length) = (0.0, 0.0, 0.0);
+            let mut changes = Changes::<S>::new();
             for d in 0..n {
                 let mut v = Stages::ZERO;
                 for e in 0..n {
                     add_product(&mut v, &momentum[e], &self.inverse_mass[(d, e)]);
                 }
-                compare(s, &v, &x_v[d], &mut change, &mut size);
-                let mut none = 0.0;
-                compare(s, &x_q[d], &x_q[d], &mut none, &mut length);
+                changes.add(s, [&v, &x_v[d]], &x_q[d]);
                 x_v[d] = v;
             }
-            worst = relative(change, max_or_nan(size, length / maps.h.abs()));
+            worst = changes.relative(maps);
         }
         let (mut z_rate, mut r_rate) = (Stages::ZERO, Stages::ZERO);
         if z {
@@ -127,7 +125,9 @@ impl LinearStages {
             if let Some(given) = given {
                 add(&mut z_rate, &given.z_source);
             }
-            worst = max_or_nan(worst, apart(maps, &z_rate, &x.z_rate, &x.z));
+            let mut changes = Changes::<S>::new();
+            changes.add(s, [&z_rate, &x.z_rate], &x.z);
+            worst = f64::max(worst, changes.relative(maps));
         }
         if r {
             subtract_product(&mut r_rate, &x.r, &self.l_z);
@@ -144,7 +144,9 @@ impl LinearStages {
                     r_rate.0[i] -= given.r_source.0[i];
                 }
             }
-            worst = max_or_nan(worst, apart(maps, &r_rate, &x.r_rate, &x.r));
+            let mut changes = Changes::<S>::new();
+            changes.add(s, [&r_rate, &x.r_rate], &x.r);
+            worst = f64::max(worst, changes.relative(maps));
         }
         if z {
             x.z_rate = z_rate;
@@ -166,26 +168,36 @@ fn summed<S: Simd>(maps: &StepMaps, rates: &Stages, start: Option<&Stages>) -> S
     values
 }
 
-/// The largest difference and the largest value at the stages; infinite where one is NaN.
-#[inline(always)]
-fn compare(s: usize, new: &Stages, old: &Stages, change: &mut f64, size: &mut f64) {
-    for i in 0..s {
-        *change = max_or_nan(*change, (new.0[i] - old.0[i]).abs());
-        *size = max_or_nan(*size, new.0[i].abs());
+/// The largest change and the largest size of numbers at the stages. Maxima over lanes may hide a NaN.
+struct Changes<S: Simd> {
+    change: Lanes<S>,
+    size: Lanes<S>,
+    /// The largest of the values of which the numbers are the rates.
+    value: Lanes<S>,
+}
+
+impl<S: Simd> Changes<S> {
+    #[inline(always)]
+    fn new() -> Self {
+        let zero = Lanes::splat(0.0);
+        Changes { change: zero, size: zero, value: zero }
     }
-}
 
-/// A change relative to a size; 0 where both vanish.
-#[inline(always)]
-fn relative(change: f64, size: f64) -> f64 {
-    if change == 0.0 { 0.0 } else { change / size }
-}
+    #[inline(always)]
+    fn add(&mut self, s: usize, [new, old]: [&Stages; 2], values: &Stages) {
+        for r in 0..blocks::<S>(s) {
+            let new = new.block::<S>(r);
+            self.change = self.change.max((new - old.block(r)).abs());
+            self.size = self.size.max(new.abs());
+            self.value = self.value.max(values.block::<S>(r).abs());
+        }
+    }
 
-/// The relative change of the rates of values at the stages.
-#[inline(always)]
-fn apart(maps: &StepMaps, new: &Stages, old: &Stages, values: &Stages) -> f64 {
-    let (mut change, mut size, mut none, mut length) = (0.0, 0.0, 0.0, 0.0);
-    compare(maps.s, new, old, &mut change, &mut size);
-    compare(maps.s, values, values, &mut none, &mut length);
-    relative(change, max_or_nan(size, length / maps.h.abs()))
+    /// The change relative to the size of the terms; 0 where both vanish.
+    #[inline(always)]
+    fn relative(&self, maps: &StepMaps) -> f64 {
+        let change = self.change.reduce_max();
+        let size = f64::max(self.size.reduce_max(), self.value.reduce_max() / maps.h.abs());
+        if change == 0.0 { 0.0 } else { change / size }
+    }
 }

@@ -10,7 +10,8 @@ mod iteration;
 
 use crate::StepError;
 use crate::gauss::tables::coefficients::MAX_STAGES;
-use crate::numbers::registers::Stages;
+use crate::numbers::lanes::Lanes;
+use crate::numbers::registers::{Stages, blocks};
 use crate::sensitivity::stage_derivatives::StageDerivatives;
 use crate::sensitivity::stage_matrix::{StageMatrix, StageVector, stage_vector};
 use crate::sensitivity::step_maps::{Direction, StepMaps};
@@ -50,6 +51,8 @@ pub(crate) struct LinearStages {
     /// Whether the equations have the terms `v_q`, `p_v`.
     has_velocity_terms: bool,
     condensed: Option<Box<CondensedMaps>>,
+    /// The number of iterations of the condensed equations, after the first, whose changes are not looked at.
+    unchecked: u32,
     /// The equations are solved by LU factorisation where their iteration does not converge.
     fallback: Option<Box<Fallback>>,
     /// `rho W v`, and the positions and the P' of the condensed equations without those that an iteration changes.
@@ -112,6 +115,19 @@ impl StageTangent {
         }
         add_scaled(&mut self.z_rate, factor, &other.z_rate);
         add_scaled(&mut self.r_rate, factor, &other.r_rate);
+    }
+
+    /// Whether the rates at all stages are finite.
+    #[inline(always)]
+    fn is_finite<S: Simd>(&self, s: usize) -> bool {
+        let mut sum = Lanes::<S>::splat(0.0);
+        for rates in self.v.iter().chain([&self.z_rate, &self.r_rate]) {
+            for r in 0..blocks::<S>(s) {
+                // 0 for a finite number, NaN otherwise.
+                sum += rates.block::<S>(r) * 0.0;
+            }
+        }
+        sum.sum() == 0.0
     }
 
     /// Multiplies the rates by a factor.
@@ -204,6 +220,7 @@ impl LinearStages {
             r_z: Stages::ZERO,
             has_velocity_terms,
             condensed: None,
+            unchecked: 0,
             fallback: None,
             momentum: vector(),
             fixed_q: vector(),
