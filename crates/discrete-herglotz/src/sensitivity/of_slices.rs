@@ -156,16 +156,13 @@ impl<F: ScalarSystem> Quantities for SliceQuantities<F> {
     }
 }
 
-/// The most numbers that [`registers!`] keeps on the stack.
-const FEW: usize = 32;
-
-/// Binds a name to this number of copies of a zero in registers, without memory on the heap if they are few. A function that
-/// returned them would copy them.
+/// Binds a name to this number of copies of a zero in registers, without memory on the heap up to a number of them, which are
+/// set to zero in any case. A function that returned them would copy them.
 macro_rules! registers {
-    ($name:ident, $zero:expr, $count:expr) => {
+    ($name:ident, $zero:expr, $count:expr, $few:literal) => {
         let (zero, count) = ($zero, $count);
-        let (mut few, mut many) = ([zero; FEW], Vec::new());
-        let $name = if count <= FEW {
+        let (mut few, mut many) = ([zero; $few], Vec::new());
+        let $name = if count <= $few {
             &mut few[..count]
         } else {
             many.resize(count, zero);
@@ -213,7 +210,7 @@ impl<F: ScalarSystem> WithSimd for AddAtStages<'_, F> {
     fn with_simd<S: Simd>(self, _simd: S) {
         let AddAtStages { slices, quantity, at, factors, to } = self;
         let n = at.q.len();
-        registers!(all, Lanes::<S>::splat(0.0), 5 * n);
+        registers!(all, Lanes::<S>::splat(0.0), 5 * n, 10);
         split!(all, q: n, v: n, force: n, of_q: n, of_v: n);
         for r in 0..blocks::<S>(at.s) {
             let mut of_z = Lanes::<S>::splat(0.0);
@@ -247,7 +244,7 @@ impl<F: ScalarSystem> WithSimd for QuantityAlong<'_, F> {
     fn with_simd<S: Simd>(self, _simd: S) -> f64 {
         let QuantityAlong { slices, quantity, at, w, weights } = self;
         let n = at.q.len();
-        registers!(all, Lanes::<S>::splat(0.0), 5 * n);
+        registers!(all, Lanes::<S>::splat(0.0), 5 * n, 10);
         split!(all, q: n, v: n, force: n, of_q: n, of_v: n);
         let mut sum = Lanes::<S>::splat(0.0);
         for r in 0..blocks::<S>(at.s) {
@@ -320,7 +317,7 @@ impl StageDerivatives {
     fn take<S: Simd>(&mut self, slices: &impl ScalarSystem, r: usize) -> bool {
         let n = self.q.len();
         let (t, z) = (self.times.block::<S>(r), self.z.block::<S>(r));
-        registers!(all, Lanes::<S>::splat(0.0), 7 * n + 4 * n * n);
+        registers!(all, Lanes::<S>::splat(0.0), 7 * n + 4 * n * n, 30);
         split!(all, q: n, v: n, l_q: n, l_v: n, qz: n, vz: n, column: n, qq: n * n, qv: n * n, vv: n * n, copy: n * n);
         set_point(self, r, [&mut *q, &mut *v]);
         let (mut l_z, mut zz) = (Lanes::<S>::splat(0.0), [Lanes::<S>::splat(0.0)]);
@@ -375,7 +372,7 @@ impl StageDerivatives {
         let n = self.q.len();
         let at = Along::<S>::constant;
         let t = at(self.times.block::<S>(r));
-        registers!(all, at(Lanes::<S>::splat(0.0)), 3 * n + 1);
+        registers!(all, at(Lanes::<S>::splat(0.0)), 3 * n + 1, 10);
         // The position, the velocity and the action.
         split!(all, x: 2 * n + 1, force: n);
         for d in 0..n {

@@ -3,7 +3,7 @@
 use crate::invalid_input::InputTest;
 use crate::invalid_input::numbers::{EXTREME, Report};
 use contact_geom::nalgebra::DMatrix;
-use contact_geom::{GeometryError, Scalar, ScalarSystem, Slopes};
+use contact_geom::{Arguments, GeometryError, Scalar, ScalarSystem, Slopes};
 use discrete_herglotz::ensemble::Systems;
 use discrete_herglotz::sensitivity::Variable;
 use discrete_herglotz::{
@@ -127,11 +127,17 @@ impl ScalarSystem for FaultyKernels {
     fn mass_matrix<T: Scalar, const N: usize>(&self, _t: T, _q: &[T], _v: &[T], _z: T, to: &mut [T]) {
         to[0] = self.number(T::one());
     }
-    fn second_derivatives<T: Scalar, const N: usize>(&self, _t: T, q: &[T], _v: &[T], _z: T, to: [&mut [T]; 6]) {
-        let [qq, qv, vv, qz, vz, zz] = to;
+    fn with_second_derivatives<T: Scalar, const N: usize>(
+        &self,
+        Arguments { t, q, v, z }: Arguments<'_, T>,
+        to: Slopes<'_, T>,
+        second: [&mut [T]; 6],
+    ) -> T {
+        let [qq, qv, vv, qz, vz, zz] = second;
         let zero = T::zero();
         (qq[0], qv[0], vv[0]) = (self.number(-q[0].cos()), zero, T::one());
         (qz[0], vz[0], zz[0]) = (zero, zero, zero);
+        self.with_gradient::<T, N>(t, q, v, z, to)
     }
 }
 
