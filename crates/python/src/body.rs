@@ -2,6 +2,7 @@
 
 use crate::arrays::{matrix, number, numbers, value_error, vector};
 use crate::signals::Signals;
+use crate::watch::{GivenWatch, Watch};
 use herglotz_runtime::{
     AnyIntegrator, Body, BodyDerivatives, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyTorque,
     Crossing, Direction, GroupStatus, OutputTimes, RunMonitor, RuntimeError, StepControl, Steps,
@@ -33,7 +34,10 @@ type WayRequest<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<
 struct Kept {
     rows: Vec<f64>,
     crossings: Vec<(usize, Vec<f64>)>,
+    /// The present state as a row, where the user's function is to see it.
+    present: Vec<f64>,
     signals: Signals,
+    watch: Watch,
 }
 
 impl RunMonitor for Kept {
@@ -47,8 +51,39 @@ impl RunMonitor for Kept {
         ControlFlow::Continue(())
     }
 
-    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
-        self.signals.check()
+    fn wants_present(&mut self) -> bool {
+        self.watch.is_due()
+    }
+
+    fn present(&mut self, numbers: &[f64]) {
+        self.present.clear();
+        self.present.extend_from_slice(numbers);
+    }
+
+    fn poll(&mut self, part: f64) -> ControlFlow<()> {
+        self.signals.check()?;
+        let (rows, crossings, present) = (&self.rows, &self.crossings, &self.present);
+        self.watch.poll(part, |py| {
+            // The record so far, whose last row is the present state.
+            let mut rows = rows.clone();
+            if rows.len() < present.len() || rows[rows.len() - present.len()] != present[0] {
+                rows.extend_from_slice(present);
+            }
+            let record = BodyRecord {
+                rows: matrix(py, rows, Body::COLUMNS.len())?,
+                end: vector(py, present.clone()),
+                crossings: crossings.clone(),
+                status: "in progress".to_owned(),
+                success: false,
+                integrator: String::new(),
+                step_size: f64::NAN,
+                steps: None,
+                error_estimate: None,
+                interrupted: None,
+                derivatives: None,
+            };
+            Ok(Py::new(py, record)?.into_any())
+        })
     }
 }
 
@@ -69,7 +104,8 @@ pub struct BodyRecord {
     success: bool,
     integrator: String,
     step_size: f64,
-    steps: usize,
+    /// The number of steps; `None` while the motion runs.
+    steps: Option<usize>,
     error_estimate: Option<f64>,
     interrupted: Option<Py<PyAny>>,
     /// The derivatives, where they were requested and the run was completed.
@@ -178,7 +214,7 @@ fn record_of(
         success: matches!(outcome.status, GroupStatus::Completed | GroupStatus::Event { .. }) && raised.is_none(),
         integrator: outcome.by.to_string(),
         step_size: outcome.step_size,
-        steps: outcome.steps,
+        steps: Some(outcome.steps),
         error_estimate: outcome.error_estimate,
         interrupted: raised.map(|raised| raised.into_value(py).into_any()),
         derivatives: None,
@@ -187,6 +223,7 @@ fn record_of(
 
 /// Runs a motion of a rigid body with the interpreter lock released.
 #[pyfunction]
+#[pyo3(signature = (body, start, t, every, way, events, sensitivity, watch = None))]
 #[expect(clippy::too_many_arguments, reason = "they are those of the function of Python")]
 pub fn run_rigid_body(
     py: Python<'_>,
@@ -197,17 +234,23 @@ pub fn run_rigid_body(
     way: WayRequest<'_>,
     events: Vec<EventRequest>,
     sensitivity: bool,
+    watch: GivenWatch,
 ) -> PyResult<BodyRecord> {
     let body = body_of(&body)?;
     let signals = Signals::new();
     let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
     let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
-    let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), signals: signals.clone() };
+    let (present, watch) = (Vec::new(), Watch::of(watch));
+    let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), present, signals: signals.clone(), watch };
     let outcome: Result<BodyOutcome, RuntimeError> = py.detach(|| body.run(&motion, &mut kept));
     let outcome = outcome.map_err(value_error)?;
-    let raised = signals.take();
+    let raised = signals.take().or_else(|| kept.watch.take());
     let is_whole = raised.is_none() && outcome.status == GroupStatus::Completed;
     let mut record = record_of(py, &outcome, kept.rows, kept.crossings, raised)?;
+    if kept.watch.stopped {
+        record.success = false;
+        record.status = format!("stopped by `callback` at t = {}", outcome.row()[0]);
+    }
     if sensitivity && is_whole {
         // The steps are known.
         let steps = StepControl::Steps { by: outcome.by, steps: Steps::Count(outcome.steps) };

@@ -2,7 +2,7 @@
 
 use crate::arrays::{number, numbers, value_error, whole};
 use crate::motion::Motion;
-use crate::signals::with_signals;
+use crate::signals::{no_report, with_signals};
 use crate::system::System;
 use herglotz_runtime::{InitialVelocity, Interrupt, Start};
 use pyo3::prelude::*;
@@ -70,7 +70,7 @@ type Checked = (String, f64, Vec<Sample>, Vec<(String, String, f64)>, bool, Opti
 pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyResult<Checked> {
     let count = whole("places", &places, 1)?;
     // A check runs on threads of its own, on which Python does not handle signals.
-    let (found, raised) = with_signals(py, |ended| {
+    let (found, raised) = with_signals(py, no_report, |ended| {
         let ended = ended.clone();
         let interrupt = Some(Interrupt::when(move || ended.load(Ordering::Relaxed)));
         let request = herglotz_runtime::Motion { interrupt, ..motion.motion.clone() };

@@ -14,7 +14,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Stores the final states of the members, or their rows.
 struct RowStore {
@@ -28,6 +28,8 @@ struct RowStore {
     success: Vec<bool>,
     troubles: Vec<(usize, String)>,
     crossings: Vec<(usize, Crossing)>,
+    /// The number of members that have ended.
+    done: Arc<AtomicUsize>,
     /// Whether a signal handler has raised an exception.
     ended: Arc<AtomicBool>,
 }
@@ -83,6 +85,7 @@ impl EnsembleMonitor for RowStore {
         self.troubles.extend(trouble.map(|trouble| (index, trouble)));
         self.t.push(ending.as_ref().map_or(f64::NAN, |end| end.t));
         self.steps.push(ending.as_ref().map_or(0, |end| end.steps as i64));
+        self.done.store(self.t.len(), Ordering::Relaxed);
         match self.rows {
             None => {
                 let row = ending.map(|end| end.columns).unwrap_or_default();
@@ -222,6 +225,7 @@ impl Members {
 
 /// Runs an ensemble with the interpreter lock released.
 #[pyfunction]
+#[pyo3(signature = (system, start, t, step_control, names, values, events, observed, threads, progress = None))]
 #[expect(clippy::too_many_arguments, reason = "they are those of `ensemble`, which names them")]
 pub fn run_ensemble(
     py: Python<'_>,
@@ -234,6 +238,7 @@ pub fn run_ensemble(
     events: Vec<GivenEvent<'_>>,
     observed: Vec<String>,
     threads: Option<Bound<'_, PyAny>>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<EnsembleRecord> {
     let (n, times) = (system.inner.dimension(), motion::times(&t)?);
     let members = Members::new(system, start, &times, &step_control, names, &values, threads)?;
@@ -247,6 +252,7 @@ pub fn run_ensemble(
         columns.push(named("the column", text, Column::parse(text, &system.formula))?);
     }
     let (with_resets, events) = crate::events::events(events, system)?;
+    let done = Arc::new(AtomicUsize::new(0));
     let mut kept = RowStore {
         n,
         rows: rows.as_ref().map(Vec::len),
@@ -257,7 +263,12 @@ pub fn run_ensemble(
         success: Vec::with_capacity(count),
         troubles: Vec::new(),
         crossings: Vec::new(),
+        done: done.clone(),
         ended: Arc::new(AtomicBool::new(false)),
+    };
+    let report = |py: Python<'_>| match &progress {
+        Some(progress) => progress.call1(py, (done.load(Ordering::Relaxed) as f64 / count as f64,)).map(drop),
+        None => Ok(()),
     };
     let run = |ended: &Arc<AtomicBool>| {
         kept.ended = ended.clone();
@@ -266,7 +277,7 @@ pub fn run_ensemble(
             with_resets.ensemble(&Ensemble { rows, columns: &columns, events: &events, ..ensemble }, &mut kept)
         })
     };
-    let (tally, raised) = with_signals(py, run)?;
+    let (tally, raised) = with_signals(py, report, run)?;
     let tally = match tally {
         // The ensemble was interrupted before it began.
         Err(_) if raised.is_some() => Tally::default(),

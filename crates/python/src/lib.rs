@@ -23,6 +23,7 @@ mod symbol;
 mod system;
 mod table;
 mod text;
+mod watch;
 
 use herglotz_runtime::{AnyIntegrator, CATALOGUE};
 use pyo3::prelude::*;

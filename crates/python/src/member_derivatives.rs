@@ -5,7 +5,7 @@ use crate::ensemble::{GivenStarts, Members};
 use crate::events::GivenEvent;
 use crate::motion::{self, GivenStepControl};
 use crate::sensitivity::loss_of;
-use crate::signals::with_signals;
+use crate::signals::{no_report, with_signals};
 use crate::system::System;
 use herglotz_runtime::{
     EndCovector, Ensemble, Event, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, Status,
@@ -54,7 +54,7 @@ fn interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Interrupt) -> Result<T, RuntimeError> + Send,
 ) -> PyResult<T> {
-    let (found, raised) = with_signals(py, |ended| {
+    let (found, raised) = with_signals(py, no_report, |ended| {
         let ended = ended.clone();
         work(&Interrupt::when(move || ended.load(Ordering::Relaxed)))
     })?;

@@ -3,6 +3,7 @@
 use crate::arrays::{matrix, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
+use crate::watch::{GivenWatch, Watch};
 use herglotz_runtime::{
     AfterReset, Crossing, INTERRUPTION, InitialVelocity, InputError, Outcome, OutputTimes, ResumeState, RunMonitor,
     RuntimeError, Status,
@@ -26,15 +27,50 @@ pub struct RowStore {
     log_factor: Vec<f64>,
     columns: Vec<f64>,
     crossings: Vec<Crossing>,
+    /// The present state as a row, where the user's function is to see it.
+    present: Vec<f64>,
     signals: Signals,
-    /// The exception that a signal handler has raised.
-    raised: Option<PyErr>,
-    /// The state at which a signal has interrupted the motion.
+    watch: Watch,
+    /// The state at which a signal or a callback has interrupted the motion.
     halted: Option<ResumeState>,
 }
 
 impl RunMonitor for RowStore {
     fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
+        self.push(numbers);
+        ControlFlow::Continue(())
+    }
+
+    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
+        self.crossings.push(crossing.clone());
+        ControlFlow::Continue(())
+    }
+
+    fn wants_present(&mut self) -> bool {
+        self.watch.is_due()
+    }
+
+    fn present(&mut self, numbers: &[f64]) {
+        self.present.clear();
+        self.present.extend_from_slice(numbers);
+    }
+
+    fn poll(&mut self, part: f64) -> ControlFlow<()> {
+        self.signals.check()?;
+        let mut watch = std::mem::replace(&mut self.watch, Watch::of(None));
+        let found = watch.poll(part, |py| self.so_far(py));
+        self.watch = watch;
+        found
+    }
+
+    fn interrupted(&mut self, at: ResumeState) {
+        self.halted = Some(at);
+    }
+}
+
+impl RowStore {
+    /// Stores a row.
+    fn push(&mut self, numbers: &[f64]) {
         let n = self.n;
         let mut rest = numbers;
         let mut take = |count: usize, to: &mut Vec<f64>| {
@@ -52,20 +88,31 @@ impl RunMonitor for RowStore {
             take(1, &mut self.log_factor);
         }
         take(usize::MAX, &mut self.columns);
-        ControlFlow::Continue(())
     }
 
-    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
-        self.crossings.push(crossing.clone());
-        ControlFlow::Continue(())
-    }
-
-    fn poll(&mut self, _part: f64) -> ControlFlow<()> {
-        self.signals.check()
-    }
-
-    fn interrupted(&mut self, at: ResumeState) {
-        self.halted = Some(at);
+    /// The record so far, whose last row is the present state.
+    fn so_far(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let mut rows = RowStore {
+            extra: self.extra,
+            t: self.t.clone(),
+            q: self.q.clone(),
+            v: self.v.clone(),
+            p: self.p.clone(),
+            z: self.z.clone(),
+            energy: self.energy.clone(),
+            log_factor: self.log_factor.clone(),
+            columns: self.columns.clone(),
+            crossings: self.crossings.clone(),
+            ..RowStore::new(self.n, self.conformal_factor, self.signals.clone(), None)
+        };
+        if self.present.first() != rows.t.last() {
+            rows.push(&self.present);
+        }
+        let last = |x: &[f64]| x[x.len().saturating_sub(self.n)..].to_vec();
+        let t = rows.t.last().copied().unwrap_or(f64::NAN);
+        let end = (t, last(&rows.q), last(&rows.p), rows.z.last().copied(), Some(last(&rows.v)));
+        let outcome = RecordEnd { end, status: "in progress".to_owned(), ..RecordEnd::default() };
+        Ok(Py::new(py, rows.into_record(py, outcome)?)?.into_any())
     }
 }
 
@@ -102,25 +149,41 @@ pub struct Record {
     success: bool,
     unresolved: Option<String>,
     error_estimate: Option<f64>,
-    steps: usize,
-    evaluations: u64,
+    /// The numbers of steps and of evaluations; `None` while the motion runs.
+    steps: Option<usize>,
+    evaluations: Option<u64>,
     interrupted: Option<Py<PyAny>>,
     /// The state from which the motion can be resumed, bitwise.
     halted: Option<Vec<u8>>,
 }
 
+/// What a record has beside its rows.
+#[derive(Default)]
+struct RecordEnd {
+    end: End,
+    status: String,
+    success: bool,
+    unresolved: Option<String>,
+    error_estimate: Option<f64>,
+    steps: Option<usize>,
+    evaluations: Option<u64>,
+    raised: Option<PyErr>,
+}
+
 /// Runs a motion with the interpreter lock released.
 #[pyfunction]
-pub fn run(py: Python<'_>, motion: &Motion) -> PyResult<Record> {
-    let (mut kept, request) = (RowStore::of(motion), &motion.motion);
+#[pyo3(signature = (motion, watch = None))]
+pub fn run(py: Python<'_>, motion: &Motion, watch: GivenWatch) -> PyResult<Record> {
+    let (mut kept, request) = (RowStore::of(motion, watch), &motion.motion);
     let outcome = py.detach(|| motion.system.run(request, &mut kept));
     record(py, kept, whole(motion, outcome)?)
 }
 
 /// Resumes a motion that was interrupted at a time, and keeps the remaining rows.
 #[pyfunction]
-pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64) -> PyResult<Record> {
-    let (mut kept, mut request) = (RowStore::of(motion), motion.motion.clone());
+#[pyo3(signature = (motion, halted, at, watch = None))]
+pub fn resume(py: Python<'_>, motion: &Motion, halted: &[u8], at: f64, watch: GivenWatch) -> PyResult<Record> {
+    let (mut kept, mut request) = (RowStore::of(motion, watch), motion.motion.clone());
     let from = ResumeState::from_bytes(halted).map_err(value_error)?;
     if let Some(OutputTimes::At(times)) = &mut request.rows {
         let onward = request.end >= request.start.t;
@@ -166,17 +229,17 @@ fn outcome_of_start(motion: &Motion) -> Outcome {
 }
 
 impl RowStore {
-    fn of(motion: &Motion) -> Self {
+    fn of(motion: &Motion, watch: GivenWatch) -> Self {
         let n = motion.system.dimension();
         let own = crate::motion::columns(n, motion.conformal_factor).len();
         RowStore {
             extra: motion.motion.columns.len() - own,
-            ..RowStore::new(n, motion.conformal_factor, motion.signals.clone())
+            ..RowStore::new(n, motion.conformal_factor, motion.signals.clone(), watch)
         }
     }
 
     /// An empty record for n coordinates, without columns in addition to the state.
-    pub fn new(n: usize, conformal_factor: bool, signals: Signals) -> Self {
+    pub fn new(n: usize, conformal_factor: bool, signals: Signals, watch: GivenWatch) -> Self {
         RowStore {
             n,
             extra: 0,
@@ -190,42 +253,63 @@ impl RowStore {
             log_factor: Vec::new(),
             columns: Vec::new(),
             crossings: Vec::new(),
+            present: Vec::new(),
             signals,
-            raised: None,
+            watch: Watch::of(watch),
             halted: None,
         }
     }
 }
 
+impl RowStore {
+    fn into_record(self, py: Python<'_>, of: RecordEnd) -> PyResult<Record> {
+        let RowStore { n, extra, .. } = self;
+        let columns = if extra > 0 { Some(matrix(py, self.columns, extra)?) } else { None };
+        let crossed = |mut c: Crossing| {
+            let after = after(&mut c);
+            (c.event, c.t, c.q, c.v, c.p, c.z, after)
+        };
+        Ok(Record {
+            t: vector(py, self.t),
+            q: matrix(py, self.q, n)?,
+            v: matrix(py, self.v, n)?,
+            p: matrix(py, self.p, n)?,
+            z: vector(py, self.z),
+            energy: vector(py, self.energy),
+            log_factor: self.conformal_factor.then(|| vector(py, self.log_factor)),
+            columns,
+            crossings: self.crossings.into_iter().map(crossed).collect(),
+            end: of.end,
+            status: of.status,
+            success: of.success,
+            unresolved: of.unresolved,
+            error_estimate: of.error_estimate,
+            steps: of.steps,
+            evaluations: of.evaluations,
+            halted: self.halted.map(|halted| halted.to_bytes()),
+            interrupted: of.raised.map(|raised| raised.into_value(py).into_any()),
+        })
+    }
+}
+
 /// Converts the result of a run for Python.
 pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<Record> {
-    kept.raised = kept.signals.take();
-    let RowStore { n, extra, .. } = kept;
-    let columns = if extra > 0 { Some(matrix(py, kept.columns, extra)?) } else { None };
-    let crossed = |mut c: Crossing| {
-        let after = after(&mut c);
-        (c.event, c.t, c.q, c.v, c.p, c.z, after)
+    let raised = kept.signals.take().or_else(|| kept.watch.take());
+    // A terminal event is a regular end.
+    let reached = matches!(outcome.status, Status::Completed | Status::Stopped { .. });
+    let status = match kept.watch.stopped {
+        true => format!("stopped by `callback` at t = {}", outcome.t),
+        false => outcome.status.to_string(),
     };
-    let crossings = kept.crossings.into_iter().map(crossed).collect();
-    Ok(Record {
-        t: vector(py, kept.t),
-        q: matrix(py, kept.q, n)?,
-        v: matrix(py, kept.v, n)?,
-        p: matrix(py, kept.p, n)?,
-        z: vector(py, kept.z),
-        energy: vector(py, kept.energy),
-        log_factor: kept.conformal_factor.then(|| vector(py, kept.log_factor)),
-        columns,
-        crossings,
+    let of = RecordEnd {
         end: (outcome.t, outcome.q, outcome.p, outcome.z, outcome.v),
-        status: outcome.status.to_string(),
-        // A terminal event is a regular end.
-        success: matches!(outcome.status, Status::Completed | Status::Stopped { .. }) && kept.raised.is_none(),
+        status,
+        success: reached && raised.is_none() && !kept.watch.stopped,
         unresolved: outcome.unresolved.map(|unresolved| unresolved.to_string()),
         error_estimate: outcome.error_estimate,
-        steps: outcome.steps,
-        evaluations: outcome.evaluations,
-        halted: kept.halted.map(|halted| halted.to_bytes()),
-        interrupted: kept.raised.map(|raised| raised.into_value(py).into_any()),
-    })
+        steps: Some(outcome.steps),
+        evaluations: Some(outcome.evaluations),
+        raised,
+    };
+    kept.into_record(py, of)
 }

@@ -61,10 +61,17 @@ impl Signals {
     }
 }
 
+/// Reports nothing.
+pub fn no_report(_py: Python<'_>) -> PyResult<()> {
+    Ok(())
+}
+
 /// Runs `work` on a thread of its own, while this thread, the only one on which Python handles signals, checks for
-/// them. An exception of a handler is signalled to the work by the flag, and is returned together with its result.
+/// them, and calls `report`. An exception of a handler, or of the report, is signalled to the work by the flag, and is
+/// returned together with its result.
 pub fn with_signals<T: Send>(
     py: Python<'_>,
+    report: impl Fn(Python<'_>) -> PyResult<()> + Send,
     work: impl FnOnce(&Arc<AtomicBool>) -> T + Send,
 ) -> PyResult<(T, Option<PyErr>)> {
     let ended = Arc::new(AtomicBool::new(false));
@@ -80,7 +87,7 @@ pub fn with_signals<T: Send>(
             })?;
             while let Err(RecvTimeoutError::Timeout) = waits.recv_timeout(SIGNAL_INTERVAL) as Result<(), _> {
                 if raised.is_none()
-                    && let Err(error) = Python::attach(|py| py.check_signals())
+                    && let Err(error) = Python::attach(|py| py.check_signals().and_then(|()| report(py)))
                 {
                     raised = Some(error);
                     ended.store(true, Ordering::Relaxed);

@@ -3,6 +3,7 @@
 use crate::arrays::{number, numbers, of_runtime, value_error};
 use crate::run::{Record, RowStore, record};
 use crate::signals::Signals;
+use crate::watch::GivenWatch;
 use herglotz_runtime::{
     AnyIntegrator, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError, SiteMotion, SiteSystem,
     Start, Steps,
@@ -22,6 +23,7 @@ type Request<'py> = (
 
 /// Runs a motion of bodies.
 #[pyfunction]
+#[pyo3(signature = (masses, dimensions, g, gamma, request, watch = None))]
 pub fn run_bodies(
     py: Python<'_>,
     masses: Bound<'_, PyAny>,
@@ -29,14 +31,16 @@ pub fn run_bodies(
     g: Bound<'_, PyAny>,
     gamma: Bound<'_, PyAny>,
     request: Request<'_>,
+    watch: GivenWatch,
 ) -> PyResult<Record> {
     let (masses, g, gamma) = (numbers("masses", &masses)?, number("G", &g)?, number("gamma", &gamma)?);
     let bodies = Bodies { masses, dimensions, g, gamma };
-    run(py, request, || bodies.system())
+    run(py, (request, watch), || bodies.system())
 }
 
 /// Runs a motion of a lattice.
 #[pyfunction]
+#[pyo3(signature = (formulas, sizes, boundary, parameters, request, watch = None))]
 pub fn run_lattice(
     py: Python<'_>,
     formulas: (Vec<String>, String, Option<String>),
@@ -44,18 +48,19 @@ pub fn run_lattice(
     boundary: &str,
     parameters: Option<&Bound<'_, PyDict>>,
     request: Request<'_>,
+    watch: GivenWatch,
 ) -> PyResult<Record> {
     let (coordinates, site, bond) = formulas;
     let parameters = crate::system::values(parameters)?;
     let boundary: Boundary = boundary.parse().map_err(value_error)?;
     let lattice = Lattice { coordinates, site, bond, sizes, boundary, parameters };
-    run(py, request, || lattice.system())
+    run(py, (request, watch), || lattice.system())
 }
 
 /// Runs a motion with the interpreter lock released.
 fn run(
     py: Python<'_>,
-    request: Request<'_>,
+    (request, watch): (Request<'_>, GivenWatch),
     system: impl Send + FnOnce() -> Result<SiteSystem, RuntimeError>,
 ) -> PyResult<Record> {
     let ((q, velocity, is_momentum, z), t, every, (integrator, step, steps), conformal_factor) = request;
@@ -81,7 +86,7 @@ fn run(
     let (kept, outcome) = py
         .detach(move || {
             let system = system()?;
-            let mut kept = RowStore::new(system.dimension(), conformal_factor, Signals::new());
+            let mut kept = RowStore::new(system.dimension(), conformal_factor, Signals::new(), watch);
             let outcome = system.run(&motion, &mut kept)?;
             Ok::<_, RuntimeError>((kept, outcome))
         })

@@ -77,11 +77,16 @@ ROWS = dict(
     constraints=Changed("x^2 + y^2 = 1", PENDULUM),
     project=Refused(True, "the system has no constraints"),
 )
-SOLVE = MOTION | ROWS
+WATCH = dict(
+    progress=Refused("yes", "`progress` is 'yes'"),
+    callback=Refused(5, "`callback` is 5"),
+    callback_interval=Refused(-1.0, "`callback_interval` is -1.0"),
+)
+SOLVE = MOTION | ROWS | WATCH
 # What a loss or a differentiable motion has no use for, or has no derivatives of.
 NO_ROWS = {
     name: Refused(value, f"`{name}` cannot be given here")
-    for name, value in dict(observe={"square": "x^2"}, every=2, conformal_factor=True, estimate=True, exact=True).items()
+    for name, value in dict(observe={"square": "x^2"}, every=2, conformal_factor=True, estimate=True, exact=True, progress=True, callback=print).items()
 }
 RESET = dict(t=3.0, parameters={"k": 1.0, "gamma": -0.1})
 NO_DERIVATIVES = dict(
@@ -102,6 +107,7 @@ ENSEMBLE = {name: of for name, of in MOTION.items() if name != "scales"} | dict(
     events="x - 0.9",
     observe={"square": "x^2"},
     threads=Refused(0, "`threads` is 0"),
+    progress=WATCH["progress"],
 )
 TIMES = np.linspace(0.0, 3.0, 7)
 DATA = {"x": np.cos(TIMES) + 0.01 * np.sin(9.0 * TIMES)}
@@ -145,6 +151,7 @@ OF_MANY = dict(
     steps=Changed(7, dict(step=None, steps=8)),
     every=2,
     conformal_factor=True,
+    **WATCH,
 )
 BODY = dict(inertia=(1, 2, 3), omega=(1.0, 0.5, 0.25), t=1.0, mass=1.0, centre=(0.0, 0.1, 0.2), gravity=(0.0, 0.0, -1.0), gamma=-0.1)
 TURNED = (np.cos(0.1), np.sin(0.1), 0.0, 0.0)
@@ -180,7 +187,7 @@ CASES = {
     "ensemble_value_and_grad": (
         hz.ensemble_value_and_grad("x + x'"),
         MANY | dict(t=1.0),
-        ENSEMBLE | dict(t=1.1, observe=NO_ROWS["observe"], events=Changed(BALL, RESET), accuracy=Changed(1e-3, dict(t=50.0))),
+        ENSEMBLE | dict(t=1.1, observe=NO_ROWS["observe"], progress=NO_ROWS["progress"], events=Changed(BALL, RESET), accuracy=Changed(1e-3, dict(t=50.0))),
     ),
     "ensemble_value_and_grad()": (lambda loss: hz.ensemble_value_and_grad(loss)(**MANY), dict(loss="x"), dict(loss="x^2")),
     "system": (
@@ -261,7 +268,7 @@ CASES = {
         OF_MANY
         | dict(masses=[1.0, 0.6], q0=[[0.0, 0.1], [1.0, 0.0]], G=2.0, gamma=-0.1, integrator="strang", p0=Changed(0.5, dict(v0=None, p0=0.1))),
     ),
-    "rigid_body": (hz.rigid_body, BODY, OF_BODY | dict(every=Changed(2, dict(integrator="gauss_4", step=0.1)), events=["tip_z"], sensitivity=True)),
+    "rigid_body": (hz.rigid_body, BODY, OF_BODY | WATCH | dict(every=Changed(2, dict(integrator="gauss_4", step=0.1)), events=["tip_z"], sensitivity=True)),
     "rigid_body_between": (
         hz.rigid_body_between,
         BETWEEN,

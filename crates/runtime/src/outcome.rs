@@ -120,6 +120,14 @@ pub trait RunMonitor {
         std::ops::ControlFlow::Continue(())
     }
 
+    /// Called before each [`poll`](Self::poll): whether the present state is to be passed to [`present`](Self::present).
+    fn wants_present(&mut self) -> bool {
+        false
+    }
+
+    /// The numbers of a row at the present state, where they are [wanted](Self::wants_present); NaN where one is not known.
+    fn present(&mut self, _numbers: &[f64]) {}
+
     /// The state from which a motion that was ended by [`poll`](Self::poll) can be resumed, if its steps can be saved;
     /// those of a [resumable](crate::Motion::resumable) motion can.
     fn interrupted(&mut self, _at: discrete_herglotz::ResumeState) {}

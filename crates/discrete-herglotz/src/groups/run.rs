@@ -30,8 +30,9 @@ pub trait GroupObserver<G: LieGroup<N>, const N: usize> {
         ControlFlow::Continue(())
     }
 
-    /// Called after each step with the number of steps taken.
-    fn poll(&mut self, _taken: usize) -> ControlFlow<()> {
+    /// Called after each step with the number of steps taken, the time, and the state, which is computed where it is asked
+    /// for.
+    fn poll(&mut self, _taken: usize, _t: f64, _state: &dyn Fn() -> GroupState<G, N>) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
@@ -234,7 +235,7 @@ impl<G: LieGroup<N>, const N: usize> GroupRun<'_, G, N> {
             {
                 observed(observer.row(motion.t(), &motion.state()))?;
             }
-            observed(observer.poll(*taken))?;
+            observed(observer.poll(*taken, motion.t(), &|| motion.state()))?;
         }
         Ok(())
     }

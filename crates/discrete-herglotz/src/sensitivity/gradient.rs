@@ -55,9 +55,9 @@ pub struct LossGradient {
 
 /// A run that was performed and of which gradients can be computed, any number of them.
 ///
-/// The stages of collocation steps are kept as long as they take at most 32 MiB. Of other runs states are kept at intervals, and the steps
-/// between them are taken again, so that the stages are bitwise those of the run and the memory does not grow with the number
-/// of steps.
+/// The stages of collocation steps are kept as long as they take at most 32 MiB. Of other runs states are kept at intervals,
+/// and the steps between them are taken again, so that the stages are bitwise those of the run and the memory does not grow
+/// with the number of steps.
 pub struct RecordedRun<'p> {
     problem: Differentiable<'p>,
     plan: Plan<'p>,

@@ -34,6 +34,7 @@ pub(crate) struct KeptStates {
 pub(crate) struct KeptStages {
     /// The first step, whose kind all of them have.
     first: Option<SolvedStages>,
+    count: usize,
     numbers: Vec<f64>,
 }
 
@@ -50,6 +51,7 @@ impl KeptStages {
         }
         self.numbers.reserve(all - self.numbers.len());
         step.append_to(&mut self.numbers);
+        self.count += 1;
         true
     }
 
@@ -80,7 +82,7 @@ impl KeptStates {
 
     /// The stages of all steps, if they were kept.
     pub fn stages(&self) -> Option<&KeptStages> {
-        self.stages.as_ref()
+        self.stages.as_ref().filter(|stages| stages.count == self.taken)
     }
 
     /// The intervals of steps between kept states, each with the state at its start, from the last to the first.

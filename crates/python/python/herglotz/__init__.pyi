@@ -169,12 +169,21 @@ class Solution:
     @property
     def t_end(self) -> float: ...
     @property
+    def end(self) -> States: ...
+    @property
     def plan(self) -> Plan: ...
     @property
     def momenta(self) -> dict[str, Vector]: ...
     def __getitem__(self, name: str) -> Vector: ...
     def __call__(self, t: ArrayLike) -> States: ...
-    def resume(self, t: ArrayLike | None = None) -> Solution: ...
+    def resume(
+        self,
+        t: ArrayLike | None = None,
+        *,
+        progress: bool = False,
+        callback: Callable[[Solution], Any] | None = None,
+        callback_interval: float = 1.0,
+    ) -> Solution: ...
     def sensitivity(self, variables: str | Sequence[str]) -> Sensitivity: ...
     def pullback(
         self,
@@ -283,6 +292,10 @@ class Path:
     iterations: int
     @property
     def action(self) -> float: ...
+    def __getitem__(self, name: str) -> Vector: ...
+    def to_pandas(self) -> Any: ...
+    def to_xarray(self) -> Any: ...
+    def plot(self, *names: str, ax: Any = None) -> Any: ...
     def __bool__(self) -> bool: ...
 
 class SparseSolution:
@@ -301,9 +314,21 @@ class SparseSolution:
     @property
     def t_end(self) -> float: ...
     @property
+    def end(self) -> States: ...
+    @property
     def momenta(self) -> dict[str, Vector]: ...
-    def resume(self, t: ArrayLike | None = None) -> SparseSolution: ...
+    def resume(
+        self,
+        t: ArrayLike | None = None,
+        *,
+        progress: bool = False,
+        callback: Callable[[SparseSolution], Any] | None = None,
+        callback_interval: float = 1.0,
+    ) -> SparseSolution: ...
+    def __getitem__(self, name: str) -> Vector: ...
+    def to_pandas(self) -> Any: ...
     def to_xarray(self) -> Any: ...
+    def plot(self, *names: str, ax: Any = None) -> Any: ...
 
 class RigidBodyStates:
     t: Vector
@@ -314,6 +339,10 @@ class RigidBodyStates:
     tip: Vector
     energy: Vector
     z: Vector
+    def __getitem__(self, name: str) -> Vector: ...
+    def to_pandas(self) -> Any: ...
+    def to_xarray(self) -> Any: ...
+    def plot(self, *names: str, ax: Any = None) -> Any: ...
 
 class RigidBodyDerivatives:
     in_attitude: Vector
@@ -364,6 +393,9 @@ class Ensemble:
         p: ArrayLike | None = None,
         z: ArrayLike | None = None,
     ) -> EnsembleGradient: ...
+    def to_pandas(self) -> Any: ...
+    def to_xarray(self) -> Any: ...
+    def plot(self, coordinate: int | str = 0, ax: Any = None) -> Any: ...
 
 class Geometry(NamedTuple):
     lagrangian: float
@@ -495,6 +527,9 @@ def solve(
     action: str | None = None,
     constraints: Constraints | None = None,
     project: bool = False,
+    progress: bool = False,
+    callback: Callable[[Solution], Any] | None = None,
+    callback_interval: float = 1.0,
 ) -> Solution: ...
 def lattice(
     site: str,
@@ -513,6 +548,9 @@ def lattice(
     conformal_factor: bool = False,
     coordinates: Sequence[str] | str = ("x",),
     parameters: Mapping[str, float] | None = None,
+    progress: bool = False,
+    callback: Callable[[SparseSolution], Any] | None = None,
+    callback_interval: float = 1.0,
 ) -> SparseSolution: ...
 def bodies(
     masses: ArrayLike,
@@ -529,6 +567,9 @@ def bodies(
     steps: int | None = None,
     every: int | None = None,
     conformal_factor: bool = False,
+    progress: bool = False,
+    callback: Callable[[SparseSolution], Any] | None = None,
+    callback_interval: float = 1.0,
 ) -> SparseSolution: ...
 def rigid_body(
     inertia: ArrayLike,
@@ -549,6 +590,9 @@ def rigid_body(
     every: int | None = None,
     events: str | Event | Sequence[str | Event] = (),
     sensitivity: bool = False,
+    progress: bool = False,
+    callback: Callable[[RigidBodySolution], Any] | None = None,
+    callback_interval: float = 1.0,
 ) -> RigidBodySolution: ...
 def rigid_body_between(
     inertia: ArrayLike,
@@ -606,6 +650,7 @@ def ensemble(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    progress: bool = False,
 ) -> Ensemble: ...
 @overload
 def geometry(

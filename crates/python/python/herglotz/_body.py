@@ -4,10 +4,13 @@ import numpy as np
 
 from . import _core
 from ._events import Event
+from ._rows import Rows
 from ._solution import Interrupted
 from ._system import copied, warn_of_positive
+from ._watch import NOTHING, Watch
 
-# The columns of a row of the core, in their order.
+# The columns of a row of the core, in their order, and the arrays that they are parts of.
+_COLUMNS = "t q_w q_x q_y q_z Pi1 Pi2 Pi3 omega1 omega2 omega3 M1 M2 M3 tip_x tip_y tip_z energy z".split()
 _PARTS = {
     "t": 0,
     "attitude": slice(1, 5),
@@ -20,7 +23,7 @@ _PARTS = {
 }
 
 
-class RigidBodyStates:
+class RigidBodyStates(Rows):
     """States of a rigid body, one for each entry of `t`.
 
     Attributes
@@ -42,6 +45,20 @@ class RigidBodyStates:
     def __init__(self, rows):
         for name, part in _PARTS.items():
             setattr(self, name, rows[:, part])
+        self._rows = rows
+
+    def _columns(self):
+        return {name: column for name, column in zip(_COLUMNS, self._rows.T) if name != "t"}
+
+    def _arrays(self):
+        data = {"attitude": (("t", "quaternion"), self.attitude), "tip": (("t", "axis_in_space"), self.tip)}
+        data |= {name: (("t", "axis_in_body"), getattr(self, name)) for name in ("Pi", "omega")}
+        data |= {"M": (("t", "axis_in_space"), self.M), "energy": ("t", self.energy), "z": ("t", self.z)}
+        axes = {"quaternion": list("wxyz"), "axis_in_body": [1, 2, 3], "axis_in_space": list("xyz")}
+        return data, axes, {}
+
+    def _plotted(self):
+        return "omega1", "omega2", "omega3"
 
     def __repr__(self):
         return f"<{type(self).__name__}: {len(self.t)} states>"
@@ -138,6 +155,9 @@ def rigid_body(
     every=None,
     events=(),
     sensitivity=False,
+    progress=False,
+    callback=None,
+    callback_interval=1.0,
 ):
     """The motion of a rigid body about a fixed point, with gravity and linear drag, on the rotation group.
 
@@ -186,6 +206,8 @@ def rigid_body(
     sensitivity : bool
         Also compute the derivatives of the end in the start and in the parameters, `RigidBodySolution.derivatives`. It
         takes a Gauss method, which is "gauss_4" where only an accuracy is given.
+    progress, callback, callback_interval
+        As in `solve`.
 
     Returns
     -------
@@ -208,6 +230,7 @@ def rigid_body(
     >>> sol.attitude.shape
     (101, 4)
     """
+    watch = Watch(progress, callback, callback_interval)
     body, start = _request(inertia, mass, centre, gravity, gamma, torque, attitude, omega, z0)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or the times of the rows")
@@ -215,13 +238,18 @@ def rigid_body(
     if sensitivity and integrator is None and step is None and steps is None:
         integrator = "gauss_4"
     way = accuracy, integrator, step, steps
-    record = _core.run_rigid_body(body, start, copied(t), every, way, events, bool(sensitivity))
-    return _solution(record, len(events))
+    return _solution((body, start, copied(t), every, way, events, bool(sensitivity)), watch)
 
 
-def _solution(record, events=0):
-    """The solution of a record, unless a signal ended the run."""
-    sol = RigidBodySolution(record, events)
+def _solution(request, watch=NOTHING):
+    """The solution of a request, unless a signal ended the run."""
+
+    def solution(record):
+        return RigidBodySolution(record, len(request[5]))
+
+    with watch.on(solution) as given:
+        record = _core.run_rigid_body(*request, given)
+    sol = solution(record)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(sol)
@@ -290,7 +318,7 @@ def rigid_body_between(
     way = None, integrator, step, steps
     found = _core.rigid_body_between(body, start, copied(t), way, copied(to))
     start = start[0], np.array(found), start[2]
-    return _solution(_core.run_rigid_body(body, start, copied(t), None, way, [], False))
+    return _solution((body, start, copied(t), None, way, [], False))
 
 
 def rigid_bodies(

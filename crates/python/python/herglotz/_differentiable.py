@@ -143,7 +143,9 @@ class DifferentiableMotion:
 
     def _request(self, members):
         given, named = self._arguments(members, self.t)
-        return request_of(**_ENSEMBLE.bind(given, named))[:2]
+        arguments = _ENSEMBLE.bind(given, named)
+        arguments.pop("progress")
+        return request_of(**arguments)[:2]
 
     def _ensemble(self, members, t):
         given, named = self._arguments(members, t)

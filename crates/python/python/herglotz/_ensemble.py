@@ -7,9 +7,11 @@ import numpy as np
 from . import _core
 from ._additions import breaks_of
 from ._events import events_of, has_reset, texts_of_events
+from ._rows import axes_of
 from ._solution import Interrupted, crossings
 from ._solve import columns_of, functions_of, system_and_start
 from ._system import check_used, copied, warn_of_gain, with_tables
+from ._watch import Watch
 
 
 def ensemble(
@@ -33,6 +35,7 @@ def ensemble(
     rayleigh=None,
     tables=None,
     breaks=None,
+    progress=False,
 ):
     """M motions of one Lagrangian on several threads; the result does not depend on the number of threads.
 
@@ -54,6 +57,8 @@ def ensemble(
         As in `solve`; their results also have the member. A terminal event ends the motion of its member only.
     threads : int, optional
         By default the number of processors.
+    progress : bool
+        As in `solve`: the part of the members that have ended.
     accuracy, integrator, step, steps, observe, coordinates, force, rayleigh, tables, breaks
         As in `solve`.
 
@@ -68,12 +73,15 @@ def ensemble(
     Interrupted
         A `KeyboardInterrupt` with the ensemble: the members that had ended, and the others without success.
     """
+    watch = Watch(progress, None, 1.0)
     system, request, columns = request_of(
         L, q0, v0, t, p0, z0, accuracy, integrator, step, steps, events, observe, coordinates, parameters, threads, force,
         rayleigh, tables, breaks,
     )  # fmt: skip
     start, t, way, varied, values, threads, given = request
-    record = _core.run_ensemble(system, start, t, way, varied, values, given, columns, threads)
+    with watch.on(None) as functions:
+        shown = functions and functions[0]
+        record = _core.run_ensemble(system, start, t, way, varied, values, given, columns, threads, shown)
     event_names = tuple(events) if isinstance(events, dict) else len(given)
     found = Ensemble(system, record, event_names, tuple(observe or ()), request)
     if record.interrupted is not None:
@@ -206,8 +214,20 @@ class Ensemble:
         return len(self.t)
 
     def __getitem__(self, name):
-        """A column of `observe`, of shape (M,) or (M, k)."""
-        return self._observed[name]
+        """A column by name, of shape (M,) or (M, k): observed, a coordinate, a velocity ``x'`` or ``z``."""
+        if name in self._observed:
+            return self._observed[name]
+        columns = self._columns()
+        if name not in columns:
+            raise KeyError(f"there is no column {name!r}: add it to `ensemble` with observe={{{name!r}: ...}}; the columns are {[*columns]}")
+        return columns[name]
+
+    def _columns(self):
+        names, velocities = self.system.coordinates, _core.velocity_names(self.system.given_coordinates)[1]
+        columns = {}
+        for of, array in ((names, self.q), (velocities, self.v), ([f"p_{name}" for name in names], self.p)):
+            columns |= {name: array[..., i] for i, name in enumerate(of)}
+        return columns | {"z": self.z} | self._observed
 
     def sensitivity(self, variables):
         """The derivatives of the rows of all members with respect to variables, as `Solution.sensitivity` has them.
@@ -247,6 +267,49 @@ class Ensemble:
         from ._ensemble_derivatives import pullback
 
         return pullback(self, q, v, p, z)
+
+    def to_pandas(self):
+        """The rows as a `pandas.DataFrame`, whose index is the member, or the member and t where there are several times."""
+        import pandas
+
+        columns = {name: column.ravel() for name, column in self._columns().items()}
+        if self.times is None:
+            return pandas.DataFrame({"t": self.t} | columns, index=pandas.RangeIndex(len(self), name="member"))
+        index = pandas.MultiIndex.from_product([range(len(self)), self.times], names=["member", "t"])
+        return pandas.DataFrame(columns, index=index)
+
+    def to_xarray(self):
+        """The rows as an `xarray.Dataset` with axes for member, coordinate and, where there are several of them, time."""
+        import xarray
+
+        along = ("member",) if self.times is None else ("member", "t")
+        data = {name: ((*along, "coordinate"), getattr(self, name)) for name in ("q", "v", "p")}
+        data |= {"z": (along, self.z)} | {name: (along, column) for name, column in self._observed.items()}
+        data |= {"success": ("member", self.success), "steps": ("member", self.steps)}
+        axes = {"coordinate": self.system.coordinates}
+        if self.times is None:
+            data["reached"] = ("member", self.t)
+        else:
+            axes["t"] = self.times
+        return xarray.Dataset(data, axes, {"lagrangian": self.system.lagrangian})
+
+    def plot(self, coordinate=0, ax=None):
+        """Plots a coordinate with matplotlib: against time, a line for each member, or with its velocity at the ends.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        ax = axes_of(ax)
+        names, velocities = self.system.coordinates, _core.velocity_names(self.system.given_coordinates)[1]
+        i = names.index(coordinate) if isinstance(coordinate, str) else coordinate
+        if self.times is None:
+            ax.plot(self.q[:, i], self.v[:, i], ".", markersize=3)
+            ax.set(xlabel=names[i], ylabel=velocities[i])
+        else:
+            ax.plot(self.times, self.q[..., i].T, linewidth=0.8)
+            ax.set(xlabel="t", ylabel=names[i])
+        return ax
 
     def __repr__(self):
         return f"<Ensemble: {len(self)} members, {int(np.sum(~self.success))} without success>"

@@ -114,6 +114,8 @@ def ensemble_value_and_grad(loss):
     def run(*arguments, **named):
         given = _ENSEMBLE.bind(arguments, named)
         refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe")
+        refuse_of_rows(given, "values and their gradients are computed in one call", "progress")
+        given.pop("progress")
         # As a column it is traced, and its parameters and tables are found.
         of, request, columns = request_of(**given | {"observe": {"loss": loss}})
         values, *gradients = _core.ensemble_value_and_gradient(of, request, columns[0])

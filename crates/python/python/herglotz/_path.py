@@ -3,11 +3,12 @@
 import numpy as np
 
 from . import _core
+from ._rows import Rows
 from ._solve import functions_of, system_and_start
 from ._system import check_used, copied
 
 
-class Path:
+class Path(Rows):
     """A path of k steps between two positions; made by `path`.
 
     Attributes
@@ -49,6 +50,19 @@ class Path:
     @property
     def action(self):
         return float(self.z[-1] - self.z[0])
+
+    def _columns(self):
+        names = self.system.coordinates
+        columns = dict(zip(names, self.q.T)) | {f"p_{name}": p for name, p in zip(names, self.p.T)}
+        return columns | {"z": self.z}
+
+    def _arrays(self):
+        data = {name: (("t", "coordinate"), getattr(self, name)) for name in ("q", "p")} | {"z": ("t", self.z)}
+        attributes = {"lagrangian": self.system.lagrangian, "status": self.status}
+        return data, {"coordinate": self.system.coordinates}, attributes
+
+    def _plotted(self):
+        return self.system.coordinates
 
     def __bool__(self):
         return self.found

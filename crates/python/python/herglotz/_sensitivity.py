@@ -7,6 +7,7 @@ import numpy as np
 from . import _core
 from ._arguments import Arguments
 from ._solve import request_of, solve
+from ._watch import watch_of
 
 
 class Sensitivity(NamedTuple):
@@ -162,6 +163,8 @@ def value_and_grad(loss):
     def run(*arguments, **named):
         given = _SOLVE.bind(arguments, named)
         refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe", "every", "conformal_factor", "estimate", "exact")
+        refuse_of_rows(given, "a value and its gradient are computed in one call", "progress", "callback")
+        watch_of(given)
         # As a column it is traced, and its parameters and tables are found.
         of, request, *_ = request_of(**given | {"observe": {"loss": loss}})
         (text,) = request[5]

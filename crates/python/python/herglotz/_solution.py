@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core
+from ._rows import Rows
+from ._watch import Watch
 
 
 class Crossings(NamedTuple):
@@ -72,7 +74,7 @@ class Interrupted(KeyboardInterrupt):
         return Interrupted, (self.solution,)
 
 
-class Solution:
+class Solution(Rows):
     """A motion of n coordinates with k rows; made by `solve`.
 
     Attributes
@@ -97,6 +99,8 @@ class Solution:
         The number of steps taken, and of evaluations of forces or gradients.
     t_end : float
         The time that was reached.
+    end : States
+        The state that was reached, also where a terminal event or a callback ended the run between two rows.
     """
 
     def __init__(self, system, request, record, event_names, observed):
@@ -118,6 +122,26 @@ class Solution:
     @property
     def t_end(self):
         return self._end[0]
+
+    @property
+    def end(self):
+        """The state that was reached: at the final time, at a terminal event, or where the run was stopped.
+
+        Returns
+        -------
+        States
+            t, q, v, p, z, energy: of shapes () and (n,).
+        """
+        t, q, p, z, v = self._end
+        if len(self.t) and self.t[-1] == t:
+            return States(t, self.q[-1], self.v[-1], self.p[-1], float(self.z[-1]), float(self.energy[-1]))
+        q, p, z = np.array(q), np.array(p), np.nan if z is None else z
+        v = np.full(len(q), np.nan) if v is None else np.array(v)
+        if self.system.kind[0]:
+            energy = _core.hamiltonian_geometry(self.system, (t, q, p, z))["hamiltonian"]
+        else:
+            energy = _core.geometry(self.system, (t, q, v, z))["energy"] if np.all(np.isfinite(v)) else np.nan
+        return States(t, q, v, p, z, energy)
 
     @property
     def plan(self):
@@ -168,15 +192,17 @@ class Solution:
             return States(float(t), q[0], v[0], p[0], float(z[0]), float(energy[0]))
         return States(times.astype(float), q, v, p, z, energy)
 
-    def resume(self, t=None):
+    def resume(self, t=None, *, progress=False, callback=None, callback_interval=1.0):
         """Continues from the end of the motion, with the same arguments, events and columns.
 
         Parameters
         ----------
+        progress, callback, callback_interval
+            As in `solve`.
         t : float or array, optional
             The new final time; or the times of the rows, beyond the end of this motion, the first of which may be that
-            end. By default the requested times that were not reached: a motion that Ctrl-C has interrupted then
-            continues bitwise as if it had not been interrupted, with the remaining rows and crossings.
+            end. By default the requested times that were not reached: a motion that Ctrl-C or a callback has interrupted
+            then continues bitwise as if it had not been interrupted, with the remaining rows and crossings.
 
         Returns
         -------
@@ -186,12 +212,14 @@ class Solution:
         """
         from ._solve import run
 
+        watch = Watch(progress, callback, callback_interval)
         if t is None and self._halted is not None:
-            return run(self.system, self._request, self._event_names, self._observed, (self._halted, self.t_end))
+            halted = self._halted, self.t_end
+            return run(self.system, self._request, self._event_names, self._observed, halted, watch=watch)
 
         if t is None and len(self.t) == 0 and not self.success:
             # The plan was interrupted.
-            return run(self.system, self._request, self._event_names, self._observed)
+            return run(self.system, self._request, self._event_names, self._observed, watch=watch)
 
         at, q, p, z, v = self._end
         if z is None:
@@ -210,7 +238,7 @@ class Solution:
             # The number of steps was for another span.
             way = (None, way[1], self.plan.step, None)
         request = (q, p, True, z, v), times, every, way, events, columns, conformal_factor, estimate, scales, *more
-        return run(self.system, request, self._event_names, self._observed)
+        return run(self.system, request, self._event_names, self._observed, watch=watch)
 
     def sensitivity(self, variables):
         """The derivatives of the rows with respect to variables, forward, by the tangents of the steps.
@@ -296,44 +324,21 @@ class Solution:
                 found[name] = sum(self.q[:, i] * self.p[:, j] - self.q[:, j] * self.p[:, i] for i, j in which)
         return found
 
-    def to_xarray(self):
-        """The rows as an `xarray.Dataset` with axes for time and coordinate."""
-        import xarray
+    def _columns(self):
+        columns = {name: self[name] for name in self._names()} | {"z": self.z, "energy": self.energy}
+        return columns if self.log_factor is None else columns | {"log_factor": self.log_factor}
 
-        names = self.system.coordinates
+    def _arrays(self):
         data = {name: (("t", "coordinate"), getattr(self, name)) for name in ("q", "v", "p")}
         data |= {"z": ("t", self.z), "energy": ("t", self.energy)}
         if self.log_factor is not None:
             data["log_factor"] = ("t", self.log_factor)
         data |= {name: ("t", self[name]) for name in self._observed}
         attributes = {"lagrangian": self.system.lagrangian, "status": self.status}
-        return xarray.Dataset(data, {"t": self.t, "coordinate": names}, attributes)
+        return data, {"coordinate": self.system.coordinates}, attributes
 
-    def to_pandas(self):
-        """The rows as a `pandas.DataFrame` with index t."""
-        import pandas
-
-        columns = {name: self[name] for name in self._names()}
-        columns |= {"z": self.z, "energy": self.energy}
-        if self.log_factor is not None:
-            columns["log_factor"] = self.log_factor
-        return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
-
-    def plot(self, *names, ax=None):
-        """Plots columns against time with matplotlib: those named, or the coordinates.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
-        import matplotlib.pyplot
-
-        ax = matplotlib.pyplot.gca() if ax is None else ax
-        for name in names or self.system.coordinates:
-            ax.plot(self.t, self[name], label=name)
-        ax.set_xlabel("t")
-        ax.legend()
-        return ax
+    def _plotted(self):
+        return self.system.coordinates
 
     def __getstate__(self):
         # The ends of the steps are recomputed when they are needed.

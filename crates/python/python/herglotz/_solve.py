@@ -7,6 +7,7 @@ from ._additions import breaks_of
 from ._events import events_of, texts_of_events
 from ._solution import Interrupted, Solution
 from ._system import check_used, copied, expression, system_of, warn_of_gain, with_tables
+from ._watch import NOTHING, watch_of
 
 
 def solve(
@@ -39,6 +40,9 @@ def solve(
     action=None,
     constraints=None,
     project=False,
+    progress=False,
+    callback=None,
+    callback_interval=1.0,
 ):
     """The motion of a Lagrangian system: Herglotz' equation, d/dt L_v = L_q + L_z L_v with dz/dt = L.
 
@@ -99,6 +103,13 @@ def solve(
         the multiplier times its gradient.
     project : bool
         Whether a start that violates the constraints is moved to them; otherwise it is refused, with its distance.
+    progress : bool
+        Whether the progress is shown: by tqdm, where it is installed, else by a line on standard error.
+    callback : function, optional
+        Called during the run as ``callback(sol)`` with the solution so far, whose last row is the present state; its
+        `steps` and `evaluations` are None. Where it returns True the run is stopped, and `Solution.resume` continues it.
+    callback_interval : float
+        The seconds between two calls of `callback`.
 
     Returns
     -------
@@ -111,7 +122,9 @@ def solve(
     Interrupted
         A `KeyboardInterrupt` with the solution up to the interruption.
     """
-    return run(*request_of(**locals()))
+    arguments = locals()
+    watch = watch_of(arguments)
+    return run(*request_of(**arguments), watch=watch)
 
 
 def request_of(
@@ -187,11 +200,19 @@ def request_of(
     return L, request, event_names, tuple(observe) if observe else ()
 
 
-def run(L, request, event_names, observed, halted=None):
+def run(L, request, event_names, observed, halted=None, watch=NOTHING):
     """The solution of a request, or the remaining part of an interrupted one."""
+
+    def solution(record):
+        return Solution(L, request, record, event_names, observed)
+
     motion = _core.Motion(L, *request)
-    record = _core.run(motion) if halted is None else _core.resume(motion, *halted)
-    sol = Solution(L, request, record, event_names, observed)
+    if watch is NOTHING or not (watch.progress or watch.callback):
+        record = _core.run(motion) if halted is None else _core.resume(motion, *halted)
+    else:
+        with watch.on(solution) as given:
+            record = _core.run(motion, given) if halted is None else _core.resume(motion, *halted, given)
+    sol = solution(record)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(sol)

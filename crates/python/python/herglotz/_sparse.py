@@ -5,11 +5,13 @@ import functools
 import numpy as np
 
 from . import _core
-from ._solution import Interrupted
+from ._rows import Rows, axes_of
+from ._solution import Interrupted, States
 from ._system import copied, warn_of_gain, warn_of_positive
+from ._watch import Watch
 
 
-class SparseSolution:
+class SparseSolution(Rows):
     """A motion of many coordinates with k rows; made by `lattice` and `bodies`.
 
     Attributes
@@ -29,6 +31,8 @@ class SparseSolution:
         The number of steps taken, and of evaluations of all forces.
     t_end : float
         The time that was reached.
+    end : States
+        The state that was reached.
     """
 
     def __init__(self, run, request, shape, record, bodies):
@@ -42,6 +46,17 @@ class SparseSolution:
     @property
     def t_end(self):
         return self._end[0]
+
+    @property
+    def end(self):
+        """The state that was reached, as `States`: q, v and p with the axes of the initial position.
+
+        The energy is NaN where a run was stopped between two rows.
+        """
+        t, q, p, z, v = self._end
+        q, v, p = (np.array(x).reshape(self._shape) for x in (q, v, p))
+        is_row = len(self.t) and self.t[-1] == t
+        return States(t, q, v, p, z, float(self.energy[-1]) if is_row else np.nan)
 
     @property
     def momenta(self):
@@ -60,11 +75,13 @@ class SparseSolution:
                 found[f"rotation of {names[i]}, {names[j]}"] = turned.sum(axis=1)
         return found
 
-    def resume(self, t=None):
+    def resume(self, t=None, *, progress=False, callback=None, callback_interval=1.0):
         """Continues from the end of the motion, with the same integrator and steps of the same length.
 
         Parameters
         ----------
+        progress, callback, callback_interval
+            As in `solve`.
         t : float or array, optional
             The new final time; or the times of the rows, beyond the end of this motion, the first of which may be that
             end. By default the requested times that were not reached.
@@ -89,18 +106,53 @@ class SparseSolution:
             # The number of steps was for another span.
             step, steps = abs(asked[-1] - start) / steps, None
         request = (q, p, True, z), times, every, (integrator, step, steps), conformal_factor
-        return _solution(self._run, request, self._shape, self._bodies)
+        watch = Watch(progress, callback, callback_interval)
+        return _solution(self._run, request, self._shape, self._bodies, watch)
 
-    def to_xarray(self):
-        """The rows as an `xarray.Dataset` with axes for time and for the sites or bodies."""
-        import xarray
+    def _columns(self):
+        columns = {}
+        for letter in "qvp":
+            array = getattr(self, letter)
+            for index in np.ndindex(*self._shape):
+                columns[f"{letter}[{', '.join(map(str, index))}]"] = array[(slice(None), *index)]
+        columns |= {"z": self.z, "energy": self.energy}
+        return columns if self.log_factor is None else columns | {"log_factor": self.log_factor}
 
+    def _arrays(self):
         names = ["body", "component"] if self._bodies else [f"site_{i}" for i in range(len(self._shape))]
         data = {name: (("t", *names), getattr(self, name)) for name in ("q", "v", "p")}
         data |= {"z": ("t", self.z), "energy": ("t", self.energy)}
         if self.log_factor is not None:
             data["log_factor"] = ("t", self.log_factor)
-        return xarray.Dataset(data, {"t": self.t}, {"status": self.status})
+        return data, {}, {"status": self.status}
+
+    def plot(self, *names, ax=None):
+        """Plots columns such as ``"q[0]"`` and ``"energy"`` against time with matplotlib.
+
+        Without names: the paths of bodies in the plane of their first two coordinates; the positions of a line of sites
+        over site and time; the last positions of other lattices over their first two axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        if names:
+            return super().plot(*names, ax=ax)
+        ax = axes_of(ax)
+        if self._bodies:
+            for i in range(self._shape[0]):
+                ax.plot(self.q[:, i, 0], self.q[:, i, 1], label=f"body {i}")
+            ax.set(xlabel="x", ylabel="y", aspect="equal")
+        elif len(self._shape) == 1:
+            image = ax.pcolormesh(np.arange(self._shape[0]), self.t, self.q, shading="nearest")
+            ax.set(xlabel="site", ylabel="t")
+            ax.figure.colorbar(image, ax=ax, label="q")
+        else:
+            last = self.q[-1].reshape(*self._shape[:2], -1)[..., 0]
+            image = ax.pcolormesh(last.T, shading="auto")
+            ax.set(xlabel="first axis", ylabel="second axis", title=f"q at t = {self.t[-1]:g}")
+            ax.figure.colorbar(image, ax=ax, label="q")
+        return ax
 
     def __repr__(self):
         return f"<SparseSolution: {len(self.t)} rows of {self._shape}, t = {self.t_end}, {self.steps} steps, {self.status}>"
@@ -123,6 +175,9 @@ def lattice(
     conformal_factor=False,
     coordinates=("x",),
     parameters=None,
+    progress=False,
+    callback=None,
+    callback_interval=1.0,
 ):
     """The motion of a lattice of equal sites with bonds between neighbours, with any number of sites.
 
@@ -161,6 +216,8 @@ def lattice(
         The names of the components at a site, 1 to 3 of them; ``xl`` and ``xr`` are those of ``x`` in a bond.
     parameters : dict of float, optional
         The values of the parameters by name.
+    progress, callback, callback_interval
+        As in `solve`.
 
     Returns
     -------
@@ -184,6 +241,7 @@ def lattice(
     >>> sol.q.shape
     (101, 1000)
     """
+    watch = Watch(progress, callback, callback_interval)
     coordinates = [coordinates] if isinstance(coordinates, str) else list(coordinates)
     for name, of, example in (("site", site, "x'^2/2 - (1 - cos(x)) + gamma*z"), ("bond", bond, "-k*(xr - xl)^2/2")):
         if not isinstance(of, str) and (name == "site" or of is not None):
@@ -199,7 +257,7 @@ def lattice(
         sizes = sizes[:-1]
     parameters = dict(parameters) if parameters else None
     run = functools.partial(_run_lattice, (coordinates, site, bond), sizes, boundary, parameters)
-    found = _solution(run, request, q0.shape, False)
+    found = _solution(run, request, q0.shape, False, watch)
     if parameters and "gamma" in parameters:
         warn_of_gain(_core.System(site, coordinates, parameters), np.zeros(len(coordinates)))
     return found
@@ -220,6 +278,9 @@ def bodies(
     steps=None,
     every=None,
     conformal_factor=False,
+    progress=False,
+    callback=None,
+    callback_interval=1.0,
 ):
     """The motion of any number of bodies with Newtonian gravitation of each pair and linear drag.
 
@@ -251,6 +312,8 @@ def bodies(
         Record a row every `every` steps, in place of the rows at `t`.
     conformal_factor : bool
         Whether `SparseSolution.log_factor` is computed.
+    progress, callback, callback_interval
+        As in `solve`.
 
     Returns
     -------
@@ -263,13 +326,14 @@ def bodies(
     Interrupted
         A `KeyboardInterrupt` with the solution up to the interruption.
     """
+    watch = Watch(progress, callback, callback_interval)
     q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
     masses = _array("masses", masses)
     warn_of_positive(gamma)
     if q0.ndim != 2 or len(q0) != len(masses):
         raise ValueError(f"`q0` has the shape {q0.shape}; it must have a row for each of the {len(masses)} bodies")
     run = functools.partial(_run_bodies, masses, q0.shape[1], G, gamma)
-    return _solution(run, request, q0.shape, True)
+    return _solution(run, request, q0.shape, True, watch)
 
 
 # These functions are defined in the module so that a solution can be pickled.
@@ -307,9 +371,13 @@ def _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor
     return q0, ((q0.ravel(), rate, p0 is not None, z0), copied(t), every, way, conformal_factor)
 
 
-def _solution(run, request, shape, bodies):
-    record = run(request)
-    sol = SparseSolution(run, request, shape, record, bodies)
+def _solution(run, request, shape, bodies, watch):
+    def solution(record):
+        return SparseSolution(run, request, shape, record, bodies)
+
+    with watch.on(solution) as given:
+        record = run(request, given)
+    sol = solution(record)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):
             raise Interrupted(sol)

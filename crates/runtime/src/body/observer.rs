@@ -156,11 +156,14 @@ impl GroupObserver<Rotations, 3> for Observer<'_> {
         self.monitor.crossing(&crate::Crossing { t, event, q, v, p, z: state.z, columns, after: None })
     }
 
-    fn poll(&mut self, taken: usize) -> ControlFlow<()> {
+    fn poll(&mut self, taken: usize, t: f64, state: &dyn Fn() -> GroupState<Rotations, 3>) -> ControlFlow<()> {
         self.taken = self.before + taken;
         // All of them begin the next step.
         let is_clear = self.events.iter().filter(|values| !values.is_clear()).count() == 0;
         if self.taken.is_multiple_of(STEPS_BETWEEN_POLLS) {
+            if self.monitor.wants_present() {
+                self.monitor.present(&self.rows.row(t, &state()));
+            }
             if self.monitor.poll(self.taken as f64 / self.count as f64).is_break() {
                 // None of the steps since the last poll could be saved: the run ends without a state.
                 if self.requested == Some(Halt::Interrupted) && self.taken < self.count {

@@ -92,6 +92,14 @@ impl<'r> Recorder<'r> {
             self.monitor.node(at.t, [q, &v, p].map(|x| coordinates(x, self.dimension)), *z);
         }
         let is_due = at.is_at_rest() || at.k.is_multiple_of(STEPS_BETWEEN_POLLS);
+        if is_due && self.monitor.wants_present() {
+            let (t, v, energy) = (at.t, at.velocity().ok(), at.energy().ok());
+            let State { q, p, z } = at.state.clone();
+            let row = Row { t, q, v, p, z: Some(z), energy, log_factor: at.log_factor, columns: Vec::new() };
+            self.numbers.clear();
+            self.numbers.extend(self.columns.iter().map(|column| number(self.lagrangian, column, &row)));
+            self.monitor.present(&self.numbers);
+        }
         if is_due
             && let Some(RunInfo { t0, t_end, .. }) = self.run_info
             && self.monitor.poll(if t_end == t0 { 1.0 } else { (at.t - t0) / (t_end - t0) }).is_break()

@@ -255,6 +255,11 @@ impl SparseRun<'_, '_> {
             } else {
                 (self.steps_between_polls * 2).min(MAX_STEPS_BETWEEN_POLLS)
             };
+            if self.monitor.wants_present() {
+                self.update_state()?;
+                self.set_numbers(self.log_factor)?;
+                self.monitor.present(&self.numbers);
+            }
             if self.monitor.poll(self.taken as f64 / self.count as f64).is_break() {
                 return Err(Ended::Stopped);
             }
@@ -297,8 +302,8 @@ impl SparseRun<'_, '_> {
         self.write(log_factor)
     }
 
-    /// Passes on a row of the stored state.
-    fn write(&mut self, log_factor: f64) -> Result<(), Ended> {
+    /// Sets the numbers of a row of the stored state.
+    fn set_numbers(&mut self, log_factor: f64) -> Result<(), Ended> {
         let OwnedState { t, q, v, z } = &self.last;
         let energy = self.of.energy(&self.last)?;
         self.numbers.clear();
@@ -308,6 +313,12 @@ impl SparseRun<'_, '_> {
         self.of.outward(&self.of.momenta(v), &mut self.numbers);
         self.numbers.extend([*z, energy]);
         self.numbers.extend(self.motion.conformal_factor.then_some(log_factor));
+        Ok(())
+    }
+
+    /// Passes on a row of the stored state.
+    fn write(&mut self, log_factor: f64) -> Result<(), Ended> {
+        self.set_numbers(log_factor)?;
         match self.monitor.row(&self.numbers) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Ended::Stopped),
