@@ -341,10 +341,14 @@ impl WithSimd for Pull<'_, '_> {
 #[inline(always)]
 fn extrapolate<S: Simd>(maps: &StepMaps, condensed: bool, rates: &mut StageTangent, [of_motion, of_r]: [f64; 2]) {
     if condensed {
-        rates.p_rate.iter_mut().for_each(|p_rate| extrapolate_rates::<S>(maps, p_rate, of_r));
+        for p_rate in &mut rates.p_rate {
+            extrapolate_rates::<S>(maps, p_rate, of_r);
+        }
         return;
     }
-    rates.v.iter_mut().for_each(|v| extrapolate_rates::<S>(maps, v, of_motion));
+    for v in &mut rates.v {
+        extrapolate_rates::<S>(maps, v, of_motion);
+    }
     extrapolate_rates::<S>(maps, &mut rates.z_rate, of_motion);
     extrapolate_rates::<S>(maps, &mut rates.r_rate, of_r);
 }
