@@ -333,17 +333,22 @@ def test_a_differentiable_motion_takes_what_solve_takes(package, parameter):
 SOL, ENS = hz.solve(**GIVEN), hz.ensemble(**MANY)
 PARTS = dict(q=np.ones((3, 1)), v=2 * np.ones((3, 1)), p=3 * np.ones((3, 1)), z=np.ones(3))
 PULLBACK = {name: ({}, {name: part}) for name, part in PARTS.items()}
+STOPS = dict(t=2.0, callback=lambda sol: True, callback_interval=0.0)
+RESUME = dict(
+    t=(dict(t=2.0), dict(t=3.0)), progress=WATCH["progress"], callback=(dict(t=2.0), STOPS),
+    callback_interval=(STOPS, STOPS | dict(callback_interval=1e9)),
+)  # fmt: skip
 MANY_PULLBACK = {name: ({}, {name: np.stack([part, part])}) for name, part in PARTS.items()}
 METHODS = {
     "Solution": (
         SOL,
         dict(
             __call__=dict(t=(dict(t=0.5), dict(t=0.6))), __getitem__=dict(name=(dict(name="x"), dict(name="x'"))),
-            resume=dict(t=(dict(t=2.0), dict(t=3.0))), sensitivity=dict(variables=(dict(variables="x"), dict(variables="k"))),
+            resume=RESUME, sensitivity=dict(variables=(dict(variables="x"), dict(variables="k"))),
             pullback=PULLBACK,
         ),
     ),
-    "SparseSolution": (hz.lattice(**LATTICE), dict(resume=dict(t=(dict(t=2.0), dict(t=3.0))))),
+    "SparseSolution": (hz.lattice(**LATTICE), dict(resume=RESUME)),
     "Ensemble": (
         ENS,
         dict(
@@ -427,11 +432,16 @@ PUBLIC_METHODS = [
 @pytest.mark.parametrize("cls, name, parameter", PUBLIC_METHODS, ids=[" ".join(of) for of in PUBLIC_METHODS])
 def test_an_argument_of_a_method_has_an_effect(cls, name, parameter):
     if name in PLOTS:
-        assert parameter in ("ax",), f"add `{parameter}`: the axes are tested with the plots"
+        assert parameter in ("ax", "coordinate"), f"add `{parameter}`: the axes are tested with the plots"
         return
     of, methods = METHODS[cls]
-    one, other = methods[name][parameter]
     method = getattr(of, name)
+    if isinstance(methods[name][parameter], Refused):
+        refused = methods[name][parameter]
+        with pytest.raises(ValueError, match=refused.message):
+            method(**{parameter: refused.value})
+        return
+    one, other = methods[name][parameter]
     # Methods of Python's protocols take arguments by position.
     call = (lambda given: method(*given.values())) if name.startswith("_") else (lambda given: method(**given))
     assert values_of(call(one)) != values_of(call(other))

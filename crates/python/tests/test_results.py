@@ -11,7 +11,7 @@ pyplot.switch_backend("Agg")
 T = np.linspace(0.0, 2.0, 5)
 ROWS = {
     "lagrangian": lambda: hz.solve("(x'^2 + y'^2)/2 - x^2 - y^2/2 - z/10", [1.0, 0.5], [0.0, 1.0], T, coordinates=["x", "y"]),
-    "hamiltonian": lambda: hz.solve(H="p_x^2/2 + x^2/2 + z/10", q0=[1.0], p0=[0.0], t=T),
+    "hamiltonian": lambda: hz.solve(H="p_x^2/2 + x^2/2 + z/10", q0=[1.0], p0=[0.0], t=T, coordinates=["x"]),
     "rigid body": lambda: hz.rigid_body((1, 2, 3), omega=(1, 0.5, 0.25), gamma=-0.1, t=T),
     "line of sites": lambda: hz.lattice("x'^2/2 + cos(x)", "-(xr - xl)^2/2", [0.0, 1.0, 0.5], 0.0, T, step=0.1),
     "plane of sites": lambda: hz.lattice("x'^2/2 + cos(x)", "-(xr - xl)^2/2", np.eye(3), 0.0, T, step=0.1),

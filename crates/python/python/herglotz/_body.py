@@ -247,8 +247,7 @@ def _solution(request, watch=NOTHING):
     def solution(record):
         return RigidBodySolution(record, len(request[5]))
 
-    with watch.on(solution) as given:
-        record = _core.run_rigid_body(*request, given)
+    record = watch.run(lambda watched: _core.run_rigid_body(*request, watched), solution)
     sol = solution(record)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):

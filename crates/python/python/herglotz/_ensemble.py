@@ -79,9 +79,12 @@ def ensemble(
         rayleigh, tables, breaks,
     )  # fmt: skip
     start, t, way, varied, values, threads, given = request
-    with watch.on(None) as functions:
-        shown = functions and functions[0]
-        record = _core.run_ensemble(system, start, t, way, varied, values, given, columns, threads, shown)
+
+    def call(watched):
+        shown = watched and watched[0]
+        return _core.run_ensemble(system, start, t, way, varied, values, given, columns, threads, shown)
+
+    record = watch.run(call)
     event_names = tuple(events) if isinstance(events, dict) else len(given)
     found = Ensemble(system, record, event_names, tuple(observe or ()), request)
     if record.interrupted is not None:

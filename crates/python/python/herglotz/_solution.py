@@ -113,7 +113,7 @@ class Solution(Rows):
         self.steps, self.evaluations = record.steps, record.evaluations
         self._end, self._halted = record.end, record.halted
         self._observed = observed
-        self._columns = record.columns
+        self._observed_rows = record.columns
         kinds = [Crossings if event[3] is None else Resets for event in request[4]]
         self.events = crossings(kinds, record.crossings, event_names, system.dimension) if event_names else []
         self._event_names = event_names
@@ -153,7 +153,7 @@ class Solution(Rows):
     def __getitem__(self, name):
         """A column by name: observed, a coordinate, a velocity ``x'``, ``t``, ``z``, ``energy`` or ``log_factor``."""
         if name in self._observed:
-            return self._columns[:, self._observed.index(name)]
+            return self._observed_rows[:, self._observed.index(name)]
         names = self.system.coordinates
         for array, of in ((self.q, names), (self.v, _core.velocity_names(self.system.given_coordinates)[1])):
             if name in of:

@@ -207,11 +207,11 @@ def run(L, request, event_names, observed, halted=None, watch=NOTHING):
         return Solution(L, request, record, event_names, observed)
 
     motion = _core.Motion(L, *request)
-    if watch is NOTHING or not (watch.progress or watch.callback):
-        record = _core.run(motion) if halted is None else _core.resume(motion, *halted)
-    else:
-        with watch.on(solution) as given:
-            record = _core.run(motion, given) if halted is None else _core.resume(motion, *halted, given)
+
+    def call(watched):
+        return _core.run(motion, watched) if halted is None else _core.resume(motion, *halted, watched)
+
+    record = watch.run(call, solution)
     sol = solution(record)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):

@@ -375,8 +375,7 @@ def _solution(run, request, shape, bodies, watch):
     def solution(record):
         return SparseSolution(run, request, shape, record, bodies)
 
-    with watch.on(solution) as given:
-        record = run(request, given)
+    record = watch.run(lambda watched: run(request, watched), solution)
     sol = solution(record)
     if record.interrupted is not None:
         if isinstance(record.interrupted, KeyboardInterrupt):

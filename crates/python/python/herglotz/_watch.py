@@ -2,7 +2,6 @@
 
 import sys
 import time
-from contextlib import contextmanager
 
 
 class Watch:
@@ -21,19 +20,20 @@ class Watch:
             raise ValueError(f"`callback_interval` is {callback_interval!r}; it must be a number of seconds, at least 0")
         self.progress, self.callback, self.interval = progress, callback, interval
 
-    @contextmanager
-    def on(self, solution):
-        """The functions for the core, during a run whose records `solution` makes a solution of."""
-        shown = Progress() if self.progress else None
+    def run(self, call, solution=None):
+        """The record of a call of the core with the functions that are watched; `solution` makes a solution of a record."""
+        if not self.progress and self.callback is None:
+            return call(None)
         called = None if self.callback is None else (lambda record: self.callback(solution(record)), self.interval)
+        if not self.progress:
+            return call((None, called))
+        shown = Progress()
         try:
-            yield (shown and shown.update, called) if shown or called else None
-        except BaseException:
-            if shown:
-                shown.close()
-            raise
-        if shown:
-            shown.update(1.0)
+            record = call((shown.update, called))
+            if record.interrupted is None and record.success is not False:
+                shown.update(1.0)
+            return record
+        finally:
             shown.close()
 
 
