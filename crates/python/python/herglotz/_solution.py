@@ -137,10 +137,14 @@ class Solution(Rows):
             return States(t, self.q[-1], self.v[-1], self.p[-1], float(self.z[-1]), float(self.energy[-1]))
         q, p, z = np.array(q), np.array(p), np.nan if z is None else z
         v = np.full(len(q), np.nan) if v is None else np.array(v)
-        if self.system.kind[0]:
-            energy = _core.hamiltonian_geometry(self.system, (t, q, p, z))["hamiltonian"]
-        else:
-            energy = _core.geometry(self.system, (t, q, v, z))["energy"] if np.all(np.isfinite(v)) else np.nan
+        try:
+            if self.system.kind[0]:
+                energy = _core.hamiltonian_geometry(self.system, (t, q, p, z))["hamiltonian"]
+            else:
+                energy = _core.geometry(self.system, (t, q, v, z))["energy"]
+        except ValueError:
+            # Systems whose geometry is not computed, as those with constraints; the motion is run once more.
+            energy = float(self(t).energy)
         return States(t, q, v, p, z, energy)
 
     @property

@@ -91,6 +91,7 @@ class SparseSolution(Rows):
         SparseSolution
             The motion from the end of this one.
         """
+        watch = Watch(progress, callback, callback_interval)
         at, q, p, z, _ = self._end
         _, asked, every, (integrator, step, steps), conformal_factor = self._request
         asked = np.atleast_1d(np.asarray(asked, dtype=float))
@@ -106,7 +107,6 @@ class SparseSolution(Rows):
             # The number of steps was for another span.
             step, steps = abs(asked[-1] - start) / steps, None
         request = (q, p, True, z), times, every, (integrator, step, steps), conformal_factor
-        watch = Watch(progress, callback, callback_interval)
         return _solution(self._run, request, self._shape, self._bodies, watch)
 
     def _columns(self):
