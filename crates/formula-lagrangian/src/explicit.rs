@@ -1,5 +1,6 @@
 //! The explicit derivatives of a formula, with respect to a parameter or to the time.
 
+use crate::Graph;
 use crate::derived::{Derived, variables};
 use crate::evaluation::At;
 use crate::parametric_nodes::ParametricNodes;
@@ -8,7 +9,7 @@ use std::sync::OnceLock;
 
 /// The derivatives of L, of its gradient and of the forces with respect to each parameter, and to the time. Each is derived
 /// when it is first asked for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct ExplicitTapes {
     parameters: Vec<OnceLock<Option<ExplicitTape>>>,
     time: OnceLock<Option<ExplicitTape>>,
@@ -56,7 +57,7 @@ impl ExplicitTape {
             None => graph.time(),
         };
         // Each pass backward adds a few nodes for each node, so that the number of nodes needs no bound of its own.
-        let derivative = |graph: &mut crate::Graph, of| graph.gradient(of, &[by], usize::MAX)?.pop();
+        let derivative = |graph: &mut Graph, of| graph.gradient(of, &[by], usize::MAX)?.pop();
         let of_value = derivative(&mut graph, derived.root)?;
         let variables = variables(&mut graph, n);
         let mut nodes = graph.gradient(of_value, &variables, usize::MAX)?;
@@ -65,8 +66,8 @@ impl ExplicitTape {
             nodes.push(derivative(&mut graph, *force)?);
         }
         nodes.resize(3 * n + 2, graph.number(0.0));
-        let tape = Tape::new(&graph, &nodes, n)?;
-        let constants = ParametricNodes::new(&graph, &tape.constants());
+        let mut tape = Tape::new(&graph, &nodes, n)?;
+        let constants = ParametricNodes::new(&graph, &tape.take_constants());
         let mut explicit = ExplicitTape { tape, constants };
         explicit.set_constants(&derived.formula.values);
         Some(explicit)
@@ -75,6 +76,6 @@ impl ExplicitTape {
     fn set_constants(&mut self, theta: &[f64]) {
         let mut values = vec![f64::NAN; self.constants.len()];
         self.constants.evaluate(theta, At { q: &[], v: &[], z: 0.0, t: 0.0 }, &mut values);
-        self.tape.set_constants_in_order(&values);
+        self.tape.set_constants(&values);
     }
 }

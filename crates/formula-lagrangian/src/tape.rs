@@ -194,18 +194,11 @@ impl Tape {
 }
 
 impl Tape {
-    /// The nodes of its constants.
-    pub fn constants(&self) -> Vec<Id> {
-        self.constants.iter().map(|(_, source)| *source).collect()
-    }
-
-    /// Sets the constants, whose values are in the order of [`constants`](Self::constants).
-    pub fn set_constants_in_order(&mut self, values: &[f64]) {
-        for ((instruction, _), value) in self.constants.iter().zip(values) {
-            if let Some(instruction) = self.code.get_mut(*instruction) {
-                instruction.extra = value.to_bits();
-            }
-        }
+    /// The nodes of its constants, which are numbered anew in this order: [`set_constants`](Self::set_constants) then takes
+    /// their values alone.
+    pub fn take_constants(&mut self) -> Vec<Id> {
+        let numbered = self.constants.iter_mut().enumerate();
+        numbered.map(|(i, (_, source))| std::mem::replace(source, Id(i as u32))).collect()
     }
 }
 

@@ -34,8 +34,6 @@ type WayRequest<'py> = (Option<Bound<'py, PyAny>>, Option<String>, Option<Bound<
 struct Kept {
     rows: Vec<f64>,
     crossings: Vec<(usize, Vec<f64>)>,
-    /// The present state as a row, where the user's function is to see it.
-    present: Vec<f64>,
     signals: Signals,
     watch: Watch,
 }
@@ -56,22 +54,22 @@ impl RunMonitor for Kept {
     }
 
     fn present(&mut self, numbers: &[f64]) {
-        self.present.clear();
-        self.present.extend_from_slice(numbers);
+        self.watch.present(numbers);
     }
 
     fn poll(&mut self, part: f64) -> ControlFlow<()> {
         self.signals.check()?;
-        let (rows, crossings, present) = (&self.rows, &self.crossings, &self.present);
-        self.watch.poll(part, |py| {
+        let (rows, crossings) = (&self.rows, &self.crossings);
+        self.watch.poll(part, |py, present| {
             // The record so far, whose last row is the present state.
             let mut rows = rows.clone();
-            if rows.len() < present.len() || rows[rows.len() - present.len()] != present[0] {
+            let last = rows.chunks(Body::COLUMNS.len()).last().and_then(<[f64]>::first);
+            if last != present.first() {
                 rows.extend_from_slice(present);
             }
             let record = BodyRecord {
                 rows: matrix(py, rows, Body::COLUMNS.len())?,
-                end: vector(py, present.clone()),
+                end: vector(py, present.to_vec()),
                 crossings: crossings.clone(),
                 status: "in progress".to_owned(),
                 success: false,
@@ -240,8 +238,8 @@ pub fn run_rigid_body(
     let signals = Signals::new();
     let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
     let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
-    let (present, watch) = (Vec::new(), Watch::of(watch));
-    let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), present, signals: signals.clone(), watch };
+    let watch = Watch::of(watch);
+    let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), signals: signals.clone(), watch };
     let outcome: Result<BodyOutcome, RuntimeError> = py.detach(|| body.run(&motion, &mut kept));
     let outcome = outcome.map_err(value_error)?;
     let raised = signals.take().or_else(|| kept.watch.take());

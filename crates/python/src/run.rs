@@ -12,8 +12,9 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 
-/// Stores the parts of the rows of a motion.
-pub struct RowStore {
+/// The parts of the rows of a motion, and its crossings.
+#[derive(Clone)]
+struct Parts {
     n: usize,
     /// The number of columns in addition to the state.
     extra: usize,
@@ -27,49 +28,10 @@ pub struct RowStore {
     log_factor: Vec<f64>,
     columns: Vec<f64>,
     crossings: Vec<Crossing>,
-    /// The present state as a row, where the user's function is to see it.
-    present: Vec<f64>,
-    signals: Signals,
-    watch: Watch,
-    /// The state at which a signal or a callback has interrupted the motion.
-    halted: Option<ResumeState>,
 }
 
-impl RunMonitor for RowStore {
-    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
-        self.push(numbers);
-        ControlFlow::Continue(())
-    }
-
-    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
-        self.crossings.push(crossing.clone());
-        ControlFlow::Continue(())
-    }
-
-    fn wants_present(&mut self) -> bool {
-        self.watch.is_due()
-    }
-
-    fn present(&mut self, numbers: &[f64]) {
-        self.present.clear();
-        self.present.extend_from_slice(numbers);
-    }
-
-    fn poll(&mut self, part: f64) -> ControlFlow<()> {
-        self.signals.check()?;
-        let mut watch = std::mem::replace(&mut self.watch, Watch::of(None));
-        let found = watch.poll(part, |py| self.so_far(py));
-        self.watch = watch;
-        found
-    }
-
-    fn interrupted(&mut self, at: ResumeState) {
-        self.halted = Some(at);
-    }
-}
-
-impl RowStore {
-    /// Stores a row.
+impl Parts {
+    /// Adds a row.
     fn push(&mut self, numbers: &[f64]) {
         let n = self.n;
         let mut rest = numbers;
@@ -90,29 +52,82 @@ impl RowStore {
         take(usize::MAX, &mut self.columns);
     }
 
-    /// The record so far, whose last row is the present state.
-    fn so_far(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let mut rows = RowStore {
-            extra: self.extra,
-            t: self.t.clone(),
-            q: self.q.clone(),
-            v: self.v.clone(),
-            p: self.p.clone(),
-            z: self.z.clone(),
-            energy: self.energy.clone(),
-            log_factor: self.log_factor.clone(),
-            columns: self.columns.clone(),
-            crossings: self.crossings.clone(),
-            ..RowStore::new(self.n, self.conformal_factor, self.signals.clone(), None)
+    /// The record of a motion that is in progress, whose last row is its end so far.
+    fn into_record(self, py: Python<'_>) -> PyResult<Record> {
+        let Parts { n, extra, .. } = self;
+        let last = |x: &[f64]| x[x.len().saturating_sub(n)..].to_vec();
+        let t = self.t.last().copied().unwrap_or(f64::NAN);
+        let end = (t, last(&self.q), last(&self.p), self.z.last().copied(), Some(last(&self.v)));
+        let columns = if extra > 0 { Some(matrix(py, self.columns, extra)?) } else { None };
+        let crossed = |mut c: Crossing| {
+            let after = after(&mut c);
+            (c.event, c.t, c.q, c.v, c.p, c.z, after)
         };
-        if self.present.first() != rows.t.last() {
-            rows.push(&self.present);
-        }
-        let last = |x: &[f64]| x[x.len().saturating_sub(self.n)..].to_vec();
-        let t = rows.t.last().copied().unwrap_or(f64::NAN);
-        let end = (t, last(&rows.q), last(&rows.p), rows.z.last().copied(), Some(last(&rows.v)));
-        let outcome = RecordEnd { end, status: "in progress".to_owned(), ..RecordEnd::default() };
-        Ok(Py::new(py, rows.into_record(py, outcome)?)?.into_any())
+        Ok(Record {
+            t: vector(py, self.t),
+            q: matrix(py, self.q, n)?,
+            v: matrix(py, self.v, n)?,
+            p: matrix(py, self.p, n)?,
+            z: vector(py, self.z),
+            energy: vector(py, self.energy),
+            log_factor: self.conformal_factor.then(|| vector(py, self.log_factor)),
+            columns,
+            crossings: self.crossings.into_iter().map(crossed).collect(),
+            end,
+            status: "in progress".to_owned(),
+            success: false,
+            unresolved: None,
+            error_estimate: None,
+            steps: None,
+            evaluations: None,
+            halted: None,
+            interrupted: None,
+        })
+    }
+}
+
+/// Stores the rows of a motion.
+pub struct RowStore {
+    parts: Parts,
+    signals: Signals,
+    watch: Watch,
+    /// The state at which a signal or a callback has interrupted the motion.
+    halted: Option<ResumeState>,
+}
+
+impl RunMonitor for RowStore {
+    fn row(&mut self, numbers: &[f64]) -> ControlFlow<()> {
+        self.parts.push(numbers);
+        ControlFlow::Continue(())
+    }
+
+    fn crossing(&mut self, crossing: &Crossing) -> ControlFlow<()> {
+        self.parts.crossings.push(crossing.clone());
+        ControlFlow::Continue(())
+    }
+
+    fn wants_present(&mut self) -> bool {
+        self.watch.is_due()
+    }
+
+    fn present(&mut self, numbers: &[f64]) {
+        self.watch.present(numbers);
+    }
+
+    fn poll(&mut self, part: f64) -> ControlFlow<()> {
+        self.signals.check()?;
+        let parts = &self.parts;
+        self.watch.poll(part, |py, present| {
+            let mut so_far = parts.clone();
+            if present.first() != so_far.t.last() {
+                so_far.push(present);
+            }
+            Ok(Py::new(py, so_far.into_record(py)?)?.into_any())
+        })
+    }
+
+    fn interrupted(&mut self, at: ResumeState) {
+        self.halted = Some(at);
     }
 }
 
@@ -155,19 +170,6 @@ pub struct Record {
     interrupted: Option<Py<PyAny>>,
     /// The state from which the motion can be resumed, bitwise.
     halted: Option<Vec<u8>>,
-}
-
-/// What a record has beside its rows.
-#[derive(Default)]
-struct RecordEnd {
-    end: End,
-    status: String,
-    success: bool,
-    unresolved: Option<String>,
-    error_estimate: Option<f64>,
-    steps: Option<usize>,
-    evaluations: Option<u64>,
-    raised: Option<PyErr>,
 }
 
 /// Runs a motion with the interpreter lock released.
@@ -232,15 +234,14 @@ impl RowStore {
     fn of(motion: &Motion, watch: GivenWatch) -> Self {
         let n = motion.system.dimension();
         let own = crate::motion::columns(n, motion.conformal_factor).len();
-        RowStore {
-            extra: motion.motion.columns.len() - own,
-            ..RowStore::new(n, motion.conformal_factor, motion.signals.clone(), watch)
-        }
+        let mut kept = RowStore::new(n, motion.conformal_factor, motion.signals.clone(), watch);
+        kept.parts.extra = motion.motion.columns.len() - own;
+        kept
     }
 
     /// An empty record for n coordinates, without columns in addition to the state.
     pub fn new(n: usize, conformal_factor: bool, signals: Signals, watch: GivenWatch) -> Self {
-        RowStore {
+        let parts = Parts {
             n,
             extra: 0,
             conformal_factor,
@@ -253,42 +254,8 @@ impl RowStore {
             log_factor: Vec::new(),
             columns: Vec::new(),
             crossings: Vec::new(),
-            present: Vec::new(),
-            signals,
-            watch: Watch::of(watch),
-            halted: None,
-        }
-    }
-}
-
-impl RowStore {
-    fn into_record(self, py: Python<'_>, of: RecordEnd) -> PyResult<Record> {
-        let RowStore { n, extra, .. } = self;
-        let columns = if extra > 0 { Some(matrix(py, self.columns, extra)?) } else { None };
-        let crossed = |mut c: Crossing| {
-            let after = after(&mut c);
-            (c.event, c.t, c.q, c.v, c.p, c.z, after)
         };
-        Ok(Record {
-            t: vector(py, self.t),
-            q: matrix(py, self.q, n)?,
-            v: matrix(py, self.v, n)?,
-            p: matrix(py, self.p, n)?,
-            z: vector(py, self.z),
-            energy: vector(py, self.energy),
-            log_factor: self.conformal_factor.then(|| vector(py, self.log_factor)),
-            columns,
-            crossings: self.crossings.into_iter().map(crossed).collect(),
-            end: of.end,
-            status: of.status,
-            success: of.success,
-            unresolved: of.unresolved,
-            error_estimate: of.error_estimate,
-            steps: of.steps,
-            evaluations: of.evaluations,
-            halted: self.halted.map(|halted| halted.to_bytes()),
-            interrupted: of.raised.map(|raised| raised.into_value(py).into_any()),
-        })
+        RowStore { parts, signals, watch: Watch::of(watch), halted: None }
     }
 }
 
@@ -301,7 +268,7 @@ pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<
         true => format!("stopped by `callback` at t = {}", outcome.t),
         false => outcome.status.to_string(),
     };
-    let of = RecordEnd {
+    Ok(Record {
         end: (outcome.t, outcome.q, outcome.p, outcome.z, outcome.v),
         status,
         success: reached && raised.is_none() && !kept.watch.stopped,
@@ -309,7 +276,8 @@ pub fn record(py: Python<'_>, mut kept: RowStore, outcome: Outcome) -> PyResult<
         error_estimate: outcome.error_estimate,
         steps: Some(outcome.steps),
         evaluations: Some(outcome.evaluations),
-        raised,
-    };
-    kept.into_record(py, of)
+        halted: kept.halted.map(|halted| halted.to_bytes()),
+        interrupted: raised.map(|raised| raised.into_value(py).into_any()),
+        ..kept.parts.into_record(py)?
+    })
 }

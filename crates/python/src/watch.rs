@@ -17,8 +17,9 @@ pub struct Watch {
     /// When they were called last, or when the run started.
     shown: Instant,
     called: Instant,
-    /// Whether the callback is called at the next poll.
+    /// Whether the callback is called at the next poll, with this present state as a row.
     due: bool,
+    present: Vec<f64>,
     /// Whether the callback has stopped the run.
     pub stopped: bool,
     /// An exception of one of the functions.
@@ -33,7 +34,16 @@ impl Watch {
         let interval = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
         let callback = callback.map(|(callback, seconds)| (callback, interval(seconds)));
         let now = Instant::now();
-        Watch { progress, callback, shown: now, called: now, due: false, stopped: false, raised: None }
+        Watch {
+            progress,
+            callback,
+            shown: now,
+            called: now,
+            due: false,
+            present: Vec::new(),
+            stopped: false,
+            raised: None,
+        }
     }
 
     /// Whether the callback is called at the next poll, for which the present state is needed.
@@ -42,8 +52,19 @@ impl Watch {
         self.due
     }
 
-    /// Calls the functions that are due, with the completed part and with the record so far.
-    pub fn poll(&mut self, part: f64, record: impl FnOnce(Python<'_>) -> PyResult<Py<PyAny>>) -> ControlFlow<()> {
+    /// Stores the present state.
+    pub fn present(&mut self, numbers: &[f64]) {
+        self.present.clear();
+        self.present.extend_from_slice(numbers);
+    }
+
+    /// Calls the functions that are due, with the completed part, and with the record so far, which is made from the present
+    /// state.
+    pub fn poll(
+        &mut self,
+        part: f64,
+        record: impl FnOnce(Python<'_>, &[f64]) -> PyResult<Py<PyAny>>,
+    ) -> ControlFlow<()> {
         if self.stopped || self.raised.is_some() {
             return ControlFlow::Break(());
         }
@@ -57,7 +78,7 @@ impl Watch {
                 progress.call1(py, (part,))?;
             }
             match calls {
-                Some((callback, _)) => callback.call1(py, (record(py)?,))?.is_truthy(py),
+                Some((callback, _)) => callback.call1(py, (record(py, &self.present)?,))?.is_truthy(py),
                 None => Ok(false),
             }
         });

@@ -80,15 +80,15 @@ impl Solved<'_> {
             }
             v[s..].fill(0.0);
         }
-        let mut rho = table.inverse_rho;
-        rho.0[..s].iter_mut().for_each(|rho| *rho = 1.0 / *rho);
-        rho.0[s..].fill(0.0);
+        let mut rho = Stages::ZERO;
+        rho.0.iter_mut().zip(&table.inverse_rho.0).take(s).for_each(|(rho, inverse)| *rho = 1.0 / inverse);
         for d in 0..n {
             for e in 0..n {
                 let entry = mass.map_or(f64::from(u8::from(d == e)), |mass| mass[(d, e)]);
                 if entry != 0.0 {
+                    // The accelerations may have any padding.
                     let sums = self.force[d].0.iter_mut().zip(&rho.0).zip(&a[e].0);
-                    sums.for_each(|((sum, rho), a)| *sum += entry * (rho * a));
+                    sums.take(s).for_each(|((sum, rho), a)| *sum += entry * (rho * a));
                 }
             }
         }
@@ -138,8 +138,10 @@ fn through(values: &Stages, s: usize) -> Series {
 mod tests {
     use super::*;
     use crate::State;
+    use crate::gauss::system::Typed;
     use crate::numbers::array::from_fn;
     use crate::solve::chebyshev::node;
+    use contact_examples::systems::Pendulum;
     use contact_geom::numbers::max_or_nan;
     use smallvec::smallvec;
 
@@ -168,6 +170,29 @@ mod tests {
                 let off =
                     max_or_nan((&found.q - at.q).amax(), max_or_nan((&found.p - at.p).amax(), (found.z - at.z).abs()));
                 assert!(off <= 16.0 * s as f64 * f64::EPSILON, "{s} stages, node {i}: {off:e}");
+            }
+        }
+    }
+
+    /// Products with the matrices of an odd number of stages read one number of the padding, with the factor 0.
+    #[test]
+    fn padding_is_zero_whatever_that_of_the_accelerations() {
+        let (pendulum, from) = (Pendulum { gamma: -0.1 }, StepStart::zeros(1));
+        let table = Condensed::of(5, 0.3, -0.1).unwrap();
+        let of = |i: usize| if i < 5 { 1.0 + i as f64 } else { f64::NAN };
+        let [a, x] = [Stages(from_fn(of)), Stages::ZERO];
+        for mass in [None, Some(DMatrix::from_element(1, 1, 2.0))] {
+            let (mut v, mut force) = ([Stages::ZERO], [Stages::ZERO]);
+            let (mut rate, mut l) = (Stages::ZERO, Stages::ZERO);
+            let to = Solved { v: &mut v, force: &mut force, rate: &mut rate, l: &mut l };
+            let step = SolvedStep { mass: mass.as_ref(), t: 0.0, from: &from };
+            to.set_accelerations(&Typed::<_, 1>(&pendulum), &step, &table, [&[a], &[x]], false);
+            let factor = mass.map_or(1.0, |mass| mass[(0, 0)]);
+            for i in 0..MAX_STAGES {
+                let rho = if i < 5 { 1.0 / table.inverse_rho.0[i] } else { 0.0 };
+                let expected = if i < 5 { factor * (rho * of(i)) } else { 0.0 };
+                assert_eq!((force[0].0[i], rate.0[i]), (expected, rho * -0.1), "stage {i}");
+                assert!(if i < 5 { v[0].0[i] != 0.0 } else { v[0].0[i] == 0.0 }, "stage {i}");
             }
         }
     }

@@ -34,11 +34,19 @@ pub(crate) struct KeptStates {
 pub(crate) struct KeptStages {
     /// The first step, whose kind all of them have.
     first: Option<SolvedStages>,
-    count: usize,
     numbers: Vec<f64>,
 }
 
 impl KeptStages {
+    /// The number of numbers of a step.
+    fn size(&self) -> usize {
+        self.first.as_ref().map_or(1, |first| SolvedStages::size(first.s, first.start.q.len()))
+    }
+
+    fn count(&self) -> usize {
+        self.numbers.len() / self.size()
+    }
+
     /// Keeps a step of a run with an expected number of steps; `false` if it is of another kind than those before, or if there
     /// are too many.
     fn keep(&mut self, step: &SolvedStages, expected: usize) -> bool {
@@ -51,7 +59,6 @@ impl KeptStages {
         }
         self.numbers.reserve(all - self.numbers.len());
         step.append_to(&mut self.numbers);
-        self.count += 1;
         true
     }
 
@@ -61,9 +68,8 @@ impl KeptStages {
     /// Those of the function.
     pub fn for_each_backward<E>(&self, mut f: impl FnMut(usize, &TakenStep) -> Result<(), E>) -> Result<(), E> {
         let Some(first) = &self.first else { return Ok(()) };
-        let size = SolvedStages::size(first.s, first.start.q.len());
         let mut step = TakenStep::Whole(WholeStep::Collocation(first.clone()));
-        for (k, numbers) in self.numbers.chunks_exact(size).enumerate().rev() {
+        for (k, numbers) in self.numbers.chunks_exact(self.size()).enumerate().rev() {
             if let TakenStep::Whole(WholeStep::Collocation(stages)) = &mut step {
                 stages.set(numbers);
             }
@@ -82,7 +88,7 @@ impl KeptStates {
 
     /// The stages of all steps, if they were kept.
     pub fn stages(&self) -> Option<&KeptStages> {
-        self.stages.as_ref().filter(|stages| stages.count == self.taken)
+        self.stages.as_ref().filter(|stages| stages.count() == self.taken)
     }
 
     /// The intervals of steps between kept states, each with the state at its start, from the last to the first.

@@ -1,6 +1,7 @@
 """Systems of many coordinates: lattices given by the formulas of a site and of a bond, and gravitating bodies."""
 
 import functools
+import re
 
 import numpy as np
 
@@ -108,6 +109,18 @@ class SparseSolution(Rows):
             step, steps = abs(asked[-1] - start) / steps, None
         request = (q, p, True, z), times, every, (integrator, step, steps), conformal_factor
         return _solution(self._run, request, self._shape, self._bodies, watch)
+
+    def __getitem__(self, name):
+        """A column by name, of shape (k,): ``"q[0]"``, ``"v[3, 1]"``, ``"z"``, ``"energy"``, ``"t"``, ``"log_factor"``."""
+        # Without the other columns, of which there may be millions.
+        found = re.fullmatch(r"([qvp])\[([0-9]+(?:, ?[0-9]+)*)\]", name)
+        index = tuple(map(int, found[2].split(","))) if found else ()
+        if found and len(index) == len(self._shape) and all(i < n for i, n in zip(index, self._shape)):
+            return getattr(self, found[1])[(slice(None), *index)]
+        if name in ("t", "z", "energy") or name == "log_factor" and self.log_factor is not None:
+            return getattr(self, name)
+        last = ", ".join(str(n - 1) for n in self._shape)
+        raise KeyError(f"there is no column {name!r}; the columns are t, z, energy, and q, v and p with an index up to [{last}]")
 
     def _columns(self):
         columns = {}

@@ -114,7 +114,6 @@ impl LinearStages {
             momentum[d] = without_r(&x_p[d], &v_source[d], &x.r, &l_v[d]);
         }
         let mut z_rate = given.z_source;
-        let mut finite = 0.0;
         for d in 0..n {
             let mut v = Stages::ZERO;
             for e in 0..n {
@@ -123,9 +122,6 @@ impl LinearStages {
             x_v[d] = v;
             add_product(&mut z_rate, &x_q[d], &self.z_q[d]);
             add_product(&mut z_rate, &x_v[d], &l_v[d]);
-            for i in 0..s {
-                finite += v.0[i] + x_q[d].0[i];
-            }
         }
         let mut without = Stages::ZERO;
         maps.to_stages.apply::<S>(&z_rate, s, &mut without, &given.z);
@@ -135,7 +131,7 @@ impl LinearStages {
         }
         x.z_rate = z_rate;
         // The maxima over lanes may hide a NaN.
-        finite.is_finite()
+        x.is_finite::<S>(s)
     }
 }
 
