@@ -348,7 +348,7 @@ METHODS = {
             pullback=PULLBACK,
         ),
     ),
-    "SparseSolution": (hz.lattice(**LATTICE), dict(resume=RESUME)),
+    "SparseSolution": (hz.lattice(**LATTICE), dict(resume=RESUME, __getitem__=dict(name=(dict(name="q[0]"), dict(name="v[1]"))))),
     "Ensemble": (
         ENS,
         dict(

@@ -74,3 +74,9 @@ def test_ensembles_are_tables_and_pictures(t, tmp_path):
     axes = found.plot("x")
     assert len(axes.lines) == (3 if many else 1) and axes.get_ylabel() == ("x" if many else "x'")
     axes.figure.savefig(tmp_path / "plot.png")
+
+
+@pytest.mark.parametrize("name", ["q[3]", "q[0, 0]", "q[-1]", "w[0]", "q[]", "q"])
+def test_a_column_of_a_site_that_is_not_there(name):
+    with pytest.raises(KeyError, match=r"up to \[2\]"):
+        ROWS["line of sites"]()[name]
