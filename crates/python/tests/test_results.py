@@ -80,3 +80,9 @@ def test_ensembles_are_tables_and_pictures(t, tmp_path):
 def test_a_column_of_a_site_that_is_not_there(name):
     with pytest.raises(KeyError, match=r"up to \[2\]"):
         ROWS["line of sites"]()[name]
+
+
+def test_a_coordinate_of_an_ensemble_is_plotted():
+    found = hz.ensemble("(x'^2 + y'^2)/2 - x^2", [[1.0, 2.0], [0.5, 3.0]], np.ones((2, 2)), T, coordinates=["x", "y"])
+    for axes in (found.plot("y"), found.plot(1, pyplot.figure().gca())):
+        assert axes.get_ylabel() == "y" and np.array_equal(axes.lines[1].get_ydata(), found.q[1, :, 1])

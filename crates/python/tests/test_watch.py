@@ -101,6 +101,11 @@ def test_progress_is_a_line_on_standard_error(kind, without_tqdm, capsys):
     assert shown.startswith("\r") and "\r100 % after" in shown and shown.endswith(" s\n")
 
 
+def test_a_run_that_is_stopped_does_not_show_that_it_is_complete(without_tqdm, capsys):
+    MANY["lagrangian"](progress=True, callback=lambda sol: True, callback_interval=0.0)
+    assert "100 %" not in capsys.readouterr().err
+
+
 def test_progress_of_an_ensemble(without_tqdm, capsys):
     found = hz.ensemble(L, np.linspace(0.1, 1, 40)[:, None], np.zeros((40, 1)), 2e3, integrator="gauss_4", steps=20_000, progress=True, **PENDULUM)
     assert found.success.all()
