@@ -73,7 +73,8 @@ pub use error::{InputError, SelectionFailure, StepError};
 pub use gauss::integrator::{GaussCollocation, TransformedGauss};
 pub use integration::{
     DenseStep, INTERRUPTION, InitialState, Integrator, Interrupt, MethodInfo, Piece, PieceStart, PlanEntry, Problem,
-    Reset, RunSupport, SplittingScheme, Start, StepDetails, StepFailure, Stepper, StepperOptions, SystemProblem,
+    Reset, RunSupport, SplittingScheme, Start, StartProjection, StepDetails, StepFailure, StepFormula, Stepper,
+    StepperOptions, SystemProblem,
 };
 pub use rules::integrator::CustomMethod;
 #[cfg(feature = "csv")]

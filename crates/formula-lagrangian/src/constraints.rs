@@ -1,11 +1,12 @@
 //! Holonomic constraints of formulas.
 
 use crate::evaluation::{At, whole_vector};
+use crate::parametric_nodes::ParametricNodes;
 use crate::parser::{Parser, ValueName, not_holonomic};
 use crate::{Formula, FormulaError, FormulaLagrangian, Graph, Id, Node, Operation};
 use contact_geom::constraints::Constraint;
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Scalar, vector};
+use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::{Dual, Scalar, vector};
 
 /// What a Hamiltonian does not have, and what to do.
 const NO_CONSTRAINTS: (&str, &str) = ("holonomic constraints", "give a Lagrangian");
@@ -127,4 +128,31 @@ impl<const N: usize> Constraint<N, N> for FormulaLagrangian<N> {
     fn count(&self) -> usize {
         self.derived().formula.constraints.len()
     }
+
+    fn in_parameter(&self, parameter: usize, q: &SVector<f64, N>) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>)> {
+        let Formula { graph, constraints, names, values, .. } = &self.derived().formula;
+        let needed = graph.needed_by(constraints);
+        let is_parameter = |i: usize| graph.node(Id(i as u32)) == Node::Parameter(parameter as u32);
+        if !(0..needed.len()).any(|i| needed[i] && is_parameter(i)) {
+            return None;
+        }
+        let nodes = ParametricNodes::new(graph, constraints);
+        // The coordinates move along all axes, and the parameter along itself.
+        let still = |re: f64| Dual::<Along, SVector<Along, N>>::constant(Along::constant(re));
+        let mut x = q.map(still);
+        (0..N).for_each(|i| x[i].d[i].re = 1.0);
+        let mut theta: Vec<_> = values.iter().map(|value| still(*value)).collect();
+        if let Some(theta) = theta.get_mut(parameter) {
+            theta.re.d[0] = 1.0;
+        }
+        let n = names.dimension;
+        let mut c = vec![still(0.0); constraints.len()];
+        let at = At { q: x.as_slice().get(..n)?, v: x.as_slice().get(..n)?, z: still(0.0), t: still(0.0) };
+        nodes.evaluate(&theta, at, &mut c);
+        let of_value = SVector::from_fn(|a, _| c.get(a).map_or(0.0, |c| c.re.d[0]));
+        Some((of_value, SMatrix::from_fn(|a, i| c.get(a).map_or(0.0, |c| c.d[i].d[0]))))
+    }
 }
+
+/// A number with its derivative in a parameter.
+type Along = Dual<f64, SVector<f64, 1>>;

@@ -134,6 +134,7 @@
 //! at most 256 registers, including its `2 n + 2` inputs.
 
 mod breaks;
+mod composition;
 mod cones;
 mod constraints;
 mod degrees;
@@ -174,6 +175,7 @@ mod tape;
 mod token;
 mod translation;
 
+pub use composition::Inputs;
 pub use contact_geom::support::nearest_name;
 pub use error::{FormulaError, MOST_COORDINATES, ParseError};
 pub use expression::Expression;

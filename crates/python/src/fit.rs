@@ -5,8 +5,8 @@ use crate::motion::Motion;
 use crate::sensitivity::detached;
 use contact_geom::nalgebra::DMatrix;
 use herglotz_runtime::{
-    Bound as HeldAt, FittedMotion, FittedSeries, InitialVelocity, MotionFit, ResidualLoss, Series, StepControl, Steps,
-    Unknown,
+    Bound as HeldAt, FittedMotion, FittedSeries, InitialVelocity, MotionFit, ResidualLoss, Series, SignChanges,
+    StepControl, Steps, Unknown,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -59,8 +59,9 @@ fn loss_of(name: Option<(String, f64)>) -> PyResult<ResidualLoss> {
     }
 }
 
-/// A quantity with the times, the values and the standard deviations of its data.
-type GivenSeries = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>);
+/// A quantity with the times, the values and the standard deviations of its data; for times of an event, its index and the
+/// numbers of the sign changes.
+type GivenSeries = (String, Vec<f64>, Vec<f64>, Option<Vec<f64>>, Option<(usize, Vec<usize>)>);
 
 /// Fits a motion to data. The unknowns are given with their bounds.
 #[pyfunction]
@@ -77,8 +78,10 @@ pub fn fit_motion(
     absolute_deviations: bool,
 ) -> PyResult<FitRecord> {
     let unknowns = unknowns.into_iter().map(|(name, lower, upper)| Unknown { name, lower, upper });
-    let series =
-        series.into_iter().map(|(quantity, times, values, deviations)| Series { quantity, times, values, deviations });
+    let series = series.into_iter().map(|(quantity, times, values, deviations, event)| {
+        let event = event.map(|(event, numbers)| SignChanges { event, numbers });
+        Series { quantity, times, values, deviations, event }
+    });
     let request = MotionFit {
         loss: loss_of(loss)?,
         absolute_deviations,

@@ -12,6 +12,7 @@ mod events;
 mod exact;
 mod fit;
 mod member_derivatives;
+mod method;
 mod motion;
 mod operators;
 mod path;
@@ -49,6 +50,8 @@ mod _core {
     use crate::fit::{FitRecord, fit_motion};
     #[pymodule_export]
     use crate::member_derivatives::{ensemble_pullback, ensemble_sensitivity, ensemble_value_and_gradient};
+    #[pymodule_export]
+    use crate::method::{Method, lagrangian_at};
     #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]

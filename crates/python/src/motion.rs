@@ -2,9 +2,10 @@
 
 use crate::arrays::{named, number, numbers, value_error, whole, word};
 use crate::events::GivenEvent;
+use crate::method::Method;
 use crate::signals::Signals;
 use crate::system::System;
-use herglotz_runtime::{AnyIntegrator, Column, InitialVelocity, OutputTimes, Start, StepControl, Steps};
+use herglotz_runtime::{AnyIntegrator, Column, FormulaMethod, InitialVelocity, OutputTimes, Start, StepControl, Steps};
 use pyo3::prelude::*;
 
 /// A request for a motion, from the arguments of `solve`.
@@ -25,11 +26,20 @@ type GivenStart<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Bound<'py, P
 /// The arguments accuracy, integrator, step and steps.
 pub type GivenStepControl<'py> = [Option<Bound<'py, PyAny>>; 4];
 
+/// The discrete Lagrangian in the place of the integrator, if there is one.
+fn method_of([_, integrator, ..]: &GivenStepControl<'_>) -> Option<FormulaMethod> {
+    integrator.as_ref()?.cast::<Method>().ok().map(|method| method.get().inner.clone())
+}
+
 /// The step control that these arguments specify.
 pub fn step_control([accuracy, integrator, step, steps]: &GivenStepControl<'_>) -> PyResult<StepControl> {
     /// The default accuracy: that of the Python documentation.
     const ACCURACY: f64 = 1e-9;
     let named = |name: &Bound<'_, PyAny>| -> PyResult<AnyIntegrator> {
+        if name.is_instance_of::<Method>() {
+            // It is replaced by the discrete Lagrangian.
+            return Ok(AnyIntegrator::Gauss { stages: 1 });
+        }
         word("integrator", name, "\"gauss_8\"")?.parse().map_err(value_error)
     };
     let by = integrator.as_ref().map(named).transpose()?;
@@ -142,7 +152,7 @@ impl Motion {
             times
         };
         let rows = Some(every.map_or(OutputTimes::At(times), OutputTimes::Every));
-        let step_control = self::step_control(&step_control)?;
+        let (method, step_control) = (method_of(&step_control), self::step_control(&step_control)?);
         let mut all = self::columns(expected, conformal_factor);
         for text in &columns {
             all.push(named("the column", text, Column::parse(text, formula))?);
@@ -160,6 +170,7 @@ impl Motion {
             scales,
             project,
             exact,
+            method,
             interrupt: Some(signals.interrupt()),
             ..herglotz_runtime::Motion::new(start, end, step_control)
         };

@@ -4,7 +4,7 @@ use crate::arrays::{matrix, named, value_error, vector};
 use crate::motion::Motion;
 use crate::signals::Signals;
 use herglotz_runtime::{
-    EndCovector, Expression, Gradient, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status,
+    EndCovector, EventAt, Expression, Gradient, LossGradient, RunMonitor, RuntimeError, StateDerivative, Status,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
@@ -39,15 +39,24 @@ fn not_completed(status: &Status) -> PyErr {
     value_error(format!("the motion has no derivatives, since it was not completed: {status}"))
 }
 
-/// The derivatives of q, v and p, each with a row for each time and one variable after the other; those of z; and the
-/// growth.
-type Rows = ([Py<PyArray2<f64>>; 3], Py<PyArray2<f64>>, f64);
+/// The derivatives of q, v and p, each with a row for each time and one variable after the other; those of z; the growth;
+/// and the derivatives of the times of sign changes, with a row for each of them.
+type Rows = ([Py<PyArray2<f64>>; 3], Py<PyArray2<f64>>, f64, Py<PyArray2<f64>>);
 
-/// The derivatives of a motion at some times with respect to variables.
+/// The derivatives of a motion at some times, and of the times of sign changes of events, with respect to variables.
 #[pyfunction]
-pub fn sensitivity(py: Python<'_>, motion: &Motion, variables: Vec<String>, times: Vec<f64>) -> PyResult<Rows> {
+pub fn sensitivity(
+    py: Python<'_>,
+    motion: &Motion,
+    variables: Vec<String>,
+    times: Vec<f64>,
+    crossings: Vec<(usize, f64)>,
+) -> PyResult<Rows> {
+    let crossings: Vec<EventAt> = crossings.into_iter().map(|(event, t)| EventAt { event, t }).collect();
     let names: Vec<&str> = variables.iter().map(String::as_str).collect();
-    let found = detached(py, motion, |monitor| motion.system.sensitivity(&motion.motion, &names, &times, monitor))?;
+    let found = detached(py, motion, |monitor| {
+        motion.system.sensitivity_with_events(&motion.motion, &names, &times, &crossings, monitor)
+    })?;
     if found.status != Status::Completed {
         return Err(not_completed(&found.status));
     }
@@ -58,7 +67,8 @@ pub fn sensitivity(py: Python<'_>, motion: &Motion, variables: Vec<String>, time
     };
     let parts = [all(|state| &state.q)?, all(|state| &state.v)?, all(|state| &state.p)?];
     let z = found.rows.iter().flatten().map(|state| state.z).collect();
-    Ok((parts, matrix(py, z, names.len())?, found.growth))
+    let event_times = matrix(py, found.event_times.concat(), names.len())?;
+    Ok((parts, matrix(py, z, names.len())?, found.growth, event_times))
 }
 
 /// A gradient: in q0, in v0 or p0, in z0, in the parameters, in t0 and in the final time; the growth; and

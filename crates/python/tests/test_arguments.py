@@ -83,18 +83,13 @@ WATCH = dict(
     callback_interval=Refused(-1.0, "`callback_interval` is -1.0"),
 )
 SOLVE = MOTION | ROWS | WATCH
-# What a loss or a differentiable motion has no use for, or has no derivatives of.
+# What a loss or a differentiable motion has no use for.
 NO_ROWS = {
     name: Refused(value, f"`{name}` cannot be given here")
     for name, value in dict(observe={"square": "x^2"}, every=2, conformal_factor=True, estimate=True, exact=True, progress=True, callback=print).items()
 }
 RESET = dict(t=3.0, parameters={"k": 1.0, "gamma": -0.1})
-NO_DERIVATIVES = dict(
-    H=Refused("p_x^2/2", "not computed for a Hamiltonian", HAMILTONIAN),
-    constraints=Refused("x^2 + y^2 = 1", "not computed with constraints", PENDULUM),
-    events=Changed(BALL, RESET),
-)
-LOSS = SOLVE | NO_ROWS | NO_DERIVATIVES
+LOSS = SOLVE | NO_ROWS | dict(events=Changed(BALL, RESET))
 LOSS["t"] = [0.0, 1.1]
 
 MANY = dict(GIVEN, q0=[[1.0], [0.5]], v0=[[0.5], [0.0]])
@@ -130,6 +125,9 @@ FIT = MOTION | dict(
     ),
     z0=Changed(0.7, dict(L="x'^2/2 - k*x^2/2 - z^2/10", parameters={"k": 1.0})),
     accuracy=Refused(-1.0, "error is -1; it must be positive"),
+    events={"level": ("x - 0.5", [1.05])},
+    constraints=Changed("x^2 + y^2 = 1", PENDULUM | dict(L="(x'^2 + y'^2)/2 - k*y", parameters={"k": 9.81})),
+    project=Refused(True, "the system has no constraints"),
 )
 EXACT = dict(L=L, h=0.3, q0=[1.0], coordinates=COORDINATES, parameters=PARAMETERS)
 OF_EXACT = dict(
@@ -176,6 +174,21 @@ BETWEEN = BODY | dict(to=(np.cos(0.4), np.sin(0.4), 0.0, 0.0), omega=(0.8, 0.0, 
 
 def contact_map(q, p, z):
     return 2 * q, p, 2 * z
+
+
+def trapezoidal(L, t, q0, q1, z0, h):
+    v = (q1 - q0) / h
+    return h * (L(t, q0, v, z0) + L(t + h, q1, v, z0)) / 2
+
+
+def twice(L, t, q0, q1, z0, h):
+    return h * L(t + h / 2, (q0 + q1) / 2, (q1 - q0) / h, z0)
+
+
+def run_by(function, order, name=None, symmetric=False):
+    """A motion by a method of one's own, with the properties of the method."""
+    method = hz.method(function, order, name=name, symmetric=symmetric)
+    return method.name, method.order, method.symmetric, hz.solve(**GIVEN, integrator=method, step=0.1).q
 
 
 # The arguments of a call of each function, and for each parameter what changes the result or is refused.
@@ -248,8 +261,9 @@ CASES = {
         hz.compare,
         dict(GIVEN, t=0.2),
         {name: MOTION[name] for name in ("q0", "v0", "p0", "z0", "coordinates", "parameters", "rayleigh", "tables", "force")}
-        | dict(L="x'^2/2 - k*x^2/2 + gamma*z/2", t=0.3, breaks=[0.1]),
+        | dict(L="x'^2/2 - k*x^2/2 + gamma*z/2", t=0.3, breaks=[0.1], method=hz.method(trapezoidal, 1)),
     ),
+    "method": (run_by, dict(function=trapezoidal, order=1), dict(function=twice, order=2, name="other", symmetric=True)),
     "exponential": (hz.exponential, EXACT | dict(v0=[0.5]), OF_EXACT | dict(v0=[0.6])),
     "retract": (hz.retract, EXACT | dict(q1=[1.1]), OF_EXACT | dict(q1=[1.2])),
     "exact_lagrangian": (hz.exact_lagrangian, EXACT | dict(q1=[1.1]), OF_EXACT | dict(q1=[1.2])),
@@ -300,7 +314,7 @@ CASES = {
     "Interrupted": (lambda solution: str(hz.Interrupted(solution)), dict(solution=hz.solve(**GIVEN)), dict(solution=hz.solve(**GIVEN | dict(t=2.0)))),
 }  # fmt: skip
 # Functions that other names of the table stand for, as what they return takes their arguments.
-WRAPPED = {"value_and_grad": hz.solve, "ensemble_value_and_grad": hz.ensemble}
+WRAPPED = {"method": hz.method, "value_and_grad": hz.solve, "ensemble_value_and_grad": hz.ensemble}
 
 # Rows for JAX and PyTorch, whose functions take arguments by `options`.
 DIFFERENTIABLE = dict(GIVEN, t=[0.0, 0.4, 1.0])

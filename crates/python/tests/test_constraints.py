@@ -95,7 +95,6 @@ def test_what_is_not_computed_with_constraints():
     sol = hz.solve(of, *START, 1.0, integrator="gauss_2", steps=10)
     for call in (
         lambda: hz.path(of, [1.0, 0.0], [0.0, 1.0], 1.0, steps=10),
-        lambda: sol.sensitivity("g"),
         lambda: sol.lyapunov_exponents(),
     ):
         with pytest.raises(ValueError, match="not computed with constraints"):

@@ -108,7 +108,7 @@ impl RunMonitor for UntilInterrupted<'_> {
 
 impl System {
     /// Runs a motion with all integrators that apply, with steps from long to short, and measures run time and error of
-    /// each. Only the start and the end of `motion` are used. `progress` is called with the completed fraction; the
+    /// each; a [method](Motion::method) of the motion is measured beside them. Only the start and the end are used otherwise. `progress` is called with the completed fraction; the
     /// comparison ends where it returns `false`. Steps are halved until round-off dominates, or until the integrator
     /// has used its share of two seconds or four times the run time of the reference with half its steps, whichever is
     /// longer. The peers are run with a decreasing sequence of tolerances.
@@ -138,12 +138,10 @@ impl System {
             }
         }
         let (count, span) = (count?, motion.end - motion.start.t);
-        let run = |by: AnyIntegrator, count: usize| {
-            self.run(
-                &without_output(StepControl::Steps { by, steps: Steps::Count(count) }),
-                &mut UntilInterrupted(motion.interrupt.as_ref()),
-            )
-        };
+        let steps =
+            |by: AnyIntegrator, count: usize| without_output(StepControl::Steps { by, steps: Steps::Count(count) });
+        let run_of = |motion: &Motion| self.run(motion, &mut UntilInterrupted(motion.interrupt.as_ref()));
+        let run = |by: AnyIntegrator, count: usize| run_of(&steps(by, count));
         let (coarse, reference) = (run(by, count)?, run(by, 2 * count)?);
         let reference_error = apart((&coarse.q, &coarse.p), &reference);
         let mut comparison = Comparison {
@@ -184,6 +182,16 @@ impl System {
             };
             let error = |(q, p): &(Vec<f64>, Vec<f64>)| Some(apart((q, p), &reference));
             let measure = Measure { span, part, reference_error, of: (&by.to_string(), by.order()) };
+            comparison.rows.extend(work_of(&measure, MAX_HALVINGS, &run, &error, MIN_RUNS));
+        }
+        if let Some(method) = &motion.method {
+            let run = |halving: u32| {
+                let own = Motion { method: Some(method.clone()), ..steps(by, count.checked_shl(halving)?) };
+                let Outcome { t, q, p, steps, evaluations, .. } = run_of(&own).ok()?;
+                (t == reference.t).then_some(FinishedRun { steps, evaluations, end: (q, p) })
+            };
+            let error = |(q, p): &(Vec<f64>, Vec<f64>)| Some(apart((q, p), &reference));
+            let measure = Measure { span, part, reference_error, of: (method.name(), method.order()) };
             comparison.rows.extend(work_of(&measure, MAX_HALVINGS, &run, &error, MIN_RUNS));
         }
         // A first-order system has no resets.

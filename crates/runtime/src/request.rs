@@ -1,6 +1,6 @@
 //! Requests for a motion.
 
-use crate::{Column, Interrupt};
+use crate::{Column, FormulaMethod, Interrupt};
 use discrete_herglotz::{AnyIntegrator, Steps};
 use formula_lagrangian::Expression;
 
@@ -140,6 +140,8 @@ pub struct Motion {
     pub end: f64,
     /// How the motion is advanced.
     pub step_control: StepControl,
+    /// A discrete Lagrangian of one's own in the place of the integrator.
+    pub method: Option<FormulaMethod>,
     /// The times at which rows of the columns are recorded.
     pub rows: Option<OutputTimes>,
     /// The columns of a row.
@@ -178,6 +180,7 @@ impl Motion {
             start,
             end,
             step_control,
+            method: None,
             rows: None,
             columns: Vec::new(),
             events: Vec::new(),

@@ -15,9 +15,20 @@ pub struct Sensitivity {
     pub states: Vec<MotionState>,
     /// The derivatives of each of these states, in the order of the variables.
     pub rows: Vec<Vec<StateDerivative>>,
+    /// The derivatives of the times of the [sign changes](EventAt) that were given, in the order of the variables.
+    pub event_times: Vec<Vec<f64>>,
     /// The largest derivative along the motion divided by the largest one at its end, at least one: round-off of the
     /// derivatives is amplified by it.
     pub growth: f64,
+}
+
+/// A sign change of an event of a motion, as a [`Crossing`](crate::Crossing) has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EventAt {
+    /// The index of the event.
+    pub event: usize,
+    /// The time.
+    pub t: f64,
 }
 
 /// A number that depends on a motion, with its gradient.

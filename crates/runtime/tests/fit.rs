@@ -26,7 +26,7 @@ fn series(system: &System, start: &Start, quantity: &str, times: &[f64]) -> Seri
     let recorded =
         Motion { rows: Some(OutputTimes::At(times.to_vec())), columns: vec![column], ..motion(start.clone()) };
     let values = system.record(&recorded).unwrap().1.into_iter().map(|row| row[0]).collect();
-    Series { quantity: quantity.to_owned(), times: times.to_vec(), values, deviations: None }
+    Series { quantity: quantity.to_owned(), times: times.to_vec(), values, deviations: None, event: None }
 }
 
 fn times(count: u32) -> Vec<f64> {
@@ -85,7 +85,7 @@ fn the_best_of_several_starts() {
     let start = Start::new(0.0, [1.0], [0.0], 0.0);
     let times = times(60);
     let values = times.iter().map(|t| f64::cos(2.0 * t)).collect();
-    let data = Series { quantity: "x".to_owned(), times, values, deviations: None };
+    let data = Series { quantity: "x".to_owned(), times, values, deviations: None, event: None };
     let request = MotionFit::new(motion(start), [Unknown::free("k")], [data]);
     let one = system.fit(&request, &mut ()).unwrap();
     assert!((one.fit.parameters[0] - 4.0).abs() > 1.0, "{}", one.fit);
@@ -118,7 +118,13 @@ fn steps_for_an_accuracy() {
 fn invalid_fits_are_refused() {
     let system = pendulum(1.2, -0.1);
     let start = Start::new(1.0, [1.0], [0.3], 0.0);
-    let data = || Series { quantity: "theta".into(), times: vec![2.0, 3.0], values: vec![0.5, 0.1], deviations: None };
+    let data = || Series {
+        quantity: "theta".into(),
+        times: vec![2.0, 3.0],
+        values: vec![0.5, 0.1],
+        deviations: None,
+        event: None,
+    };
     let request = |unknowns: &[&str], data: Series| {
         let unknowns: Vec<Unknown> = unknowns.iter().map(|name| Unknown::free(*name)).collect();
         MotionFit::new(motion(start.clone()), unknowns, [data])
@@ -143,7 +149,13 @@ fn invalid_fits_are_refused() {
     let system = System::parse("m*x'^2/2 - k*x^2/2", &["x"], &[("m", 1.0), ("k", 1.0)]).unwrap();
     let request = request(
         &["m", "k"],
-        Series { quantity: "x".into(), times: vec![2.0, 3.0, 4.0], values: vec![0.2, -0.5, -0.9], deviations: None },
+        Series {
+            quantity: "x".into(),
+            times: vec![2.0, 3.0, 4.0],
+            values: vec![0.2, -0.5, -0.9],
+            deviations: None,
+            event: None,
+        },
     );
     let fitted = system.fit(&request, &mut ()).unwrap();
     assert!(matches!(&fitted.fit.status, FitStatus::Undetermined(null) if null.rank == 1), "{}", fitted.fit);

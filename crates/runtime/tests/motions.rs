@@ -4,6 +4,8 @@
 
 #[path = "motions/catalogue.rs"]
 mod catalogue;
+#[path = "motions/constrained_derivatives.rs"]
+mod constrained_derivatives;
 #[path = "motions/constraints.rs"]
 mod constraints;
 #[path = "motions/corners.rs"]
@@ -14,6 +16,8 @@ mod dimensions;
 mod ensembles;
 #[path = "motions/ensembles_own_steps.rs"]
 mod ensembles_own_steps;
+#[path = "motions/hamiltonian_derivatives.rs"]
+mod hamiltonian_derivatives;
 #[path = "motions/hamiltonians.rs"]
 mod hamiltonians;
 #[path = "motions/interrupted.rs"]

@@ -249,6 +249,7 @@ fn data_after_rest_are_fitted() {
             times: times.clone(),
             values: values(quantity),
             deviations: None,
+            event: None,
         });
         let fit = MotionFit::new(motion(2e4, way), ["c", "g"].map(Unknown::free), series);
         let found = guess.fit(&fit, &mut ()).unwrap();

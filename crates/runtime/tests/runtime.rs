@@ -6,6 +6,7 @@ mod accuracy;
 mod advice;
 mod body;
 mod divided_steps;
+mod event_times;
 mod fit;
 mod jump_times;
 mod lyapunov_of_impacts;

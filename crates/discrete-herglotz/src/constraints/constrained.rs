@@ -1,13 +1,14 @@
 //! Methods for holonomic constraints as integrators of runs.
 
 use super::drag_rattle::substeps;
+use super::start::inverse_mass;
 use super::variation::{Along, Varied};
 use super::{ConstrainedStart, ContactLobatto, DragRattle, OffConstraint};
 use crate::integration::OfTyped;
-use crate::integration::{StepFormula, check_kicks};
+use crate::integration::{StartProjection, StepFormula, check_kicks};
 use crate::{InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
-use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{ChartVector, Dual, Lagrangian, PhasePoint, VelocityPoint};
 
 /// A method for motions under holonomic constraints.
@@ -146,7 +147,7 @@ where
         let step = self.differentiated(problem, h, (t, from))?;
         let mut jacobian = DMatrix::zeros(2 * N + 1, 2 * N + 1);
         for k in 0..=2 * N {
-            let slope = step(Some(k), &mut Varied(None))?;
+            let slope = step(Some(k), &mut Varied { of: None, parameter: None })?;
             let entries = slope.x.iter().chain(&slope.y).chain([&slope.z]);
             entries.enumerate().for_each(|(i, entry)| jacobian[(i, k)] = *entry);
         }
@@ -158,9 +159,31 @@ where
         problem: &Problem<'a, L, N>,
         h: f64,
         (t, from, _): (f64, &PhasePoint<N>, &PhasePoint<N>),
+        parameter: Option<usize>,
         variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
     ) -> Result<Option<ChartVector<N>>, StepError> {
-        self.differentiated(problem, h, (t, from))?(None, &mut Varied(Some(variation))).map(Some)
+        self.differentiated(problem, h, (t, from))?(None, &mut Varied { of: Some(variation), parameter }).map(Some)
+    }
+
+    fn start_projection(
+        &self,
+        problem: &Problem<'a, L, N>,
+        parameters: usize,
+    ) -> Result<Option<StartProjection>, StepError> {
+        let (constraint, VelocityPoint { q, v, .. }) = (&self.constraint, problem.start);
+        let g = constraint.with_jacobian(&q).1;
+        let inverse = inverse_mass(problem.lagrangian, problem.t0, &problem.start)
+            .map_err(|_| StepError::Singular { pivot: 0.0 })?;
+        let kept = self.redundancy.imposed(constraint.count(), &g);
+        let rows: Vec<usize> = (0..M).filter(|a| kept[*a]).collect();
+        let mut curvature = SMatrix::<f64, M, N>::zeros();
+        for a in rows.iter().copied() {
+            let only = SVector::from_fn(|b, _| f64::from(u8::from(a == b)));
+            curvature.set_row(a, &(constraint.force_slope(&q, &only) * v).transpose());
+        }
+        let of = |k| constraint.in_parameter(k, &q).map(|(c, jacobian)| [c, jacobian * v]);
+        let of_parameters = (0..parameters).map(of);
+        StartProjection::new(&rows, (&g, &curvature), &inverse, of_parameters).map(Some)
     }
 }
 

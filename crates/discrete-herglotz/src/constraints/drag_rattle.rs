@@ -192,7 +192,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         let half = T::from(0.5 * h);
         p += force * half;
         z += value * half;
-        let (_, g0) = self.constraint.with_jacobian(&q0);
+        let (_, g0) = vary.constraint(&self.constraint, &q0);
         let kept = self.redundancy.imposed(self.constraint.count(), &g0.map(|e| e.re()));
         // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's
         // method.
@@ -201,7 +201,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         let (mut q, mut c, mut g);
         loop {
             q = q0 + self.velocity(t, (&q0, &p), vary) * T::from(h);
-            (c, g) = self.constraint.with_jacobian(&q);
+            (c, g) = vary.constraint(&self.constraint, &q);
             let matrix = inverted(restricted(g.map(|e| e.re()) * responses * h, &kept))?;
             mask(&mut c, &kept);
             let impulse = times(&matrix, &c);
@@ -216,7 +216,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         }
         let v = self.velocity(t, (&q0, &p), vary);
         z += p.dot(&v) * half;
-        (_, g) = self.constraint.with_jacobian(&q);
+        (_, g) = vary.constraint(&self.constraint, &q);
         let (value, force) = self.kick(t + h, &q, vary);
         p += force * half;
         z += value * half;

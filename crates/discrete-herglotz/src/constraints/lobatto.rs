@@ -227,7 +227,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Cont
             let time = t + self.tables.c[i] * self.h;
             (stage.value, stage.gradient) = self.lagrangian.with_gradient(T::from(time), &x);
             vary.add(time, &x, &mut stage.value, &mut stage.gradient);
-            (stage.c, stage.g) = self.constraint.with_jacobian(&q);
+            (stage.c, stage.g) = vary.constraint(&self.constraint, &q);
             if const { L::HINTS.forced } {
                 stage.applied = self.lagrangian.applied_force(T::from(time), &x);
             }

@@ -3,6 +3,7 @@
 use crate::ensemble::error::EnsembleError;
 use crate::ensemble::member::{Ending, Member};
 use crate::ensemble::members::{MemberSteps, Members};
+use crate::integration::StartProjection;
 use crate::run::Interruption;
 use crate::{
     InputError, Integrator, Interrupt, MethodInfo, Observer, Outcome, Plan, Problem, Rows, StepError, Stepper,
@@ -70,9 +71,18 @@ impl<'p, 'i: 'p, 'a: 'p, L: Lagrangian<N>, const N: usize> Integrator<'p, L, N> 
         problem: &Problem<'p, L, N>,
         h: f64,
         step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+        parameter: Option<usize>,
         variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
     ) -> Result<Option<ChartVector<N>>, StepError> {
-        self.integrator.step_variation(&self.own(problem), h, step, variation)
+        self.integrator.step_variation(&self.own(problem), h, step, parameter, variation)
+    }
+
+    fn start_projection(
+        &self,
+        problem: &Problem<'p, L, N>,
+        parameters: usize,
+    ) -> Result<Option<StartProjection>, StepError> {
+        self.integrator.start_projection(&self.own(problem), parameters)
     }
 }
 

@@ -1,6 +1,6 @@
 //! An integrator with the Lagrangian for which it takes steps.
 
-use crate::integration::{Integrator, MethodInfo, StepFormula, StepperOptions, SystemProblem};
+use crate::integration::{Integrator, MethodInfo, StartProjection, StepFormula, StepperOptions, SystemProblem};
 use crate::{Components, InputError, Point, State, StepError, Stepper, Vector};
 use contact_geom::Lagrangian;
 use contact_geom::nalgebra::DMatrix;
@@ -42,8 +42,17 @@ pub(crate) trait BoundIntegrator<'a> {
         _problem: &SystemProblem<'a>,
         _h: f64,
         _step: (f64, &State, &State),
+        _parameter: Option<usize>,
         _variation: &mut dyn FnMut(f64, &Point) -> (f64, Components),
     ) -> Result<Option<Components>, StepError> {
+        Ok(None)
+    }
+
+    fn start_projection(
+        &self,
+        _problem: &SystemProblem<'a>,
+        _parameters: usize,
+    ) -> Result<Option<StartProjection>, StepError> {
         Ok(None)
     }
 }
@@ -110,6 +119,7 @@ where
         problem: &SystemProblem<'a>,
         h: f64,
         (t, from, to): (f64, &State, &State),
+        parameter: Option<usize>,
         variation: &mut dyn FnMut(f64, &Point) -> (f64, Components),
     ) -> Result<Option<Components>, StepError> {
         let mut variation = |t: f64, x: &contact_geom::VelocityPoint<N>| {
@@ -117,7 +127,15 @@ where
             (l, gradient.fixed())
         };
         let (problem, step) = (problem.of(self.lagrangian), (t, &from.fixed(), &to.fixed()));
-        let found = self.integrator.step_variation(&problem, h, step, &mut variation)?;
+        let found = self.integrator.step_variation(&problem, h, step, parameter, &mut variation)?;
         Ok(found.map(Components::from))
+    }
+
+    fn start_projection(
+        &self,
+        problem: &SystemProblem<'a>,
+        parameters: usize,
+    ) -> Result<Option<StartProjection>, StepError> {
+        self.integrator.start_projection(&problem.of(self.lagrangian), parameters)
     }
 }

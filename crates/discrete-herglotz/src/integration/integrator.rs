@@ -1,6 +1,6 @@
 //! Integrators: the trait, the properties of a method and the options of its stepper.
 
-use crate::integration::Node;
+use crate::integration::{Node, StartProjection};
 use crate::{InputError, Problem, SplittingScheme, StepError, Stepper};
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{ChartVector, PhasePoint, VelocityPoint};
@@ -153,7 +153,8 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
 
     /// The derivative of the state `(q, p, z)` at the end of a step, for a fixed start, along a variation `delta L` of
     /// the Lagrangian, which is given by its value and its partial derivatives in `(q, v, z)` at points; those in q
-    /// contain the variation of an applied force. The step is given as in [`step_jacobian`](Self::step_jacobian). Derivatives in
+    /// contain the variation of an applied force. Constraints vary with the parameter, if it is the variation in one. The step
+    /// is given as in [`step_jacobian`](Self::step_jacobian). Derivatives in
     /// parameters follow, `delta L = L_theta`; in the time, `delta L = L_t`; and in the step size h, since a step with
     /// `(1 + e) h` is one with h of `L + e (L - v . L_v + (s - t) L_t)` at the times s. The default is `None`.
     ///
@@ -164,8 +165,22 @@ pub trait Integrator<'a, L: ?Sized, const N: usize> {
         _problem: &Problem<'a, L, N>,
         _h: f64,
         _step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+        _parameter: Option<usize>,
         _variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
     ) -> Result<Option<ChartVector<N>>, StepError> {
+        Ok(None)
+    }
+
+    /// The derivative of the projection of a start to constraints, in the start and in this number of parameters; `None`, the
+    /// default, without constraints.
+    ///
+    /// # Errors
+    /// [`StepError`] where the constraints are dependent or L is not regular.
+    fn start_projection(
+        &self,
+        _problem: &Problem<'a, L, N>,
+        _parameters: usize,
+    ) -> Result<Option<StartProjection>, StepError> {
         Ok(None)
     }
 }

@@ -198,7 +198,8 @@ impl<'p, P> Run<'p, '_, P> {
     /// Performs the run of a plan with one more observer, called after the others.
     pub(crate) fn observed(mut self, plan: &Plan<'p>, observer: &mut impl Observer) -> Result<Outcome, InputError> {
         let mut observers = std::mem::take(&mut self.observers);
-        observers.push(Box::new(Borrowed(observer)));
+        // It is the first to see a step, also one in which another observer ends the run.
+        observers.insert(0, Box::new(Borrowed(observer)));
         integrate(plan, &mut observers, self.from.as_ref())
     }
 }

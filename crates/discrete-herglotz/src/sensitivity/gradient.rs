@@ -10,7 +10,7 @@ use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProble
 use crate::sensitivity::row_times::{SameTime, check_times};
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::{RowTangent, StepTangent, TakenStep};
-use crate::sensitivity::tangent::no_tangent;
+use crate::sensitivity::tangent::{no_tangent, projected_start};
 use crate::sensitivity::time_jumps::TimeJumps;
 use crate::sensitivity::velocity_dependence::VelocityDependence;
 use crate::sensitivity::{EndCovector, Loss, MotionState, SensitivityError};
@@ -304,6 +304,9 @@ impl RecordedRun<'_> {
             for (range, words) in self.kept.backward() {
                 for_each_block(&mut *stepper, range, words, &mut work, &failed)?;
             }
+        }
+        if let Some(start) = projected_start(problem, &self.plan)? {
+            all.iter_mut().for_each(|covector| start.pull(covector));
         }
         let taken = self.outcome.steps;
         let gradients = all.iter().zip(explicit_times);

@@ -5,6 +5,7 @@ use crate::run::{Observer, Outcome, OutputRequest, Plan, Run, RunInfo, StepView,
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::parametric_system::{Differentiable, DifferentiableProblem};
+use crate::sensitivity::projected_start::ProjectedStart;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::{StepTangent, TakenStep};
@@ -229,7 +230,11 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         let problem = run.problem.differentiable();
         let plan = run.plan(until)?;
         let engine = StepTangent::new(&problem, &plan.steps, Direction::Forward)?;
-        let columns = variables.iter().map(|v| v.column(&problem, plan.count())).collect::<Result<Vec<_>, _>>()?;
+        let columns = variables.iter().map(|v| v.column(&problem, plan.count()));
+        let mut columns = columns.collect::<Result<Vec<_>, _>>()?;
+        if let Some(start) = projected_start(&problem, &plan)? {
+            columns.iter_mut().for_each(|column| start.push(column));
+        }
         if engine.only_in_start()
             && let Some(variable) = variables.iter().find(|variable| !variable.is_of_start())
         {
@@ -284,6 +289,14 @@ fn tangent(
         switches: Vec::new(),
         growth: if largest > size { largest / size } else { 1.0 },
     }
+}
+
+/// The projection of the start of a run with constraints.
+pub(super) fn projected_start<'p>(
+    problem: &Differentiable<'p>,
+    plan: &Plan<'p>,
+) -> Result<Option<ProjectedStart>, SensitivityError> {
+    ProjectedStart::of(problem, &plan.steps).map_err(|cause| SensitivityError::Step { step: 0, cause })
 }
 
 /// The error of a run whose integrator has no tangent.

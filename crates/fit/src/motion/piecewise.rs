@@ -70,4 +70,12 @@ impl PieceValues {
         let derivatives = DMatrix::zeros(if piece.is_differentiated { rows } else { 0 }, columns);
         PieceValues { values: vec![f64::NAN; rows], derivatives }
     }
+
+    /// Sets a value, and its derivatives at these places.
+    pub fn set(&mut self, row: usize, value: f64, derivatives: impl IntoIterator<Item = (usize, f64)>) {
+        self.values[row] = value;
+        for (place, derivative) in derivatives {
+            self.derivatives[(row, place)] = derivative;
+        }
+    }
 }

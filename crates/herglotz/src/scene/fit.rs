@@ -244,7 +244,8 @@ impl Reader<'_> {
             self.check_quantity(quantity, table.observe.is_none())?;
             let place = file.place(column, column_at.span(), "observe")?;
             let deviation = table.sigma.get(column);
-            let mut series = Series { quantity: (**quantity).clone(), times: vec![], values: vec![], deviations: None };
+            let mut series =
+                Series { quantity: (**quantity).clone(), times: vec![], values: vec![], deviations: None, event: None };
             let mut deviations = Vec::new();
             let places = match deviation.map(|deviation| (&**deviation, deviation.span())) {
                 Some((Deviation::Column(name), span)) => file.place(name, span, "sigma")?,

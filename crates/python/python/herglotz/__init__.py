@@ -38,7 +38,8 @@ _LATER = {
     "_fit": "Fit fit",
     "_path": "Path path",
     "_ensemble_derivatives": "EnsembleGradient EnsembleSensitivity ensemble_value_and_grad",
-    "_sensitivity": "Gradient LyapunovExponents Sensitivity value_and_grad",
+    "_method": "Method method",
+    "_sensitivity": "EndSensitivity Gradient LyapunovExponents Sensitivity value_and_grad",
     "_checks": "Check Comparison Contact Geometry HamiltonianGeometry check compare geometry is_contact",
 }
 _LATER = {name: module for module, names in _LATER.items() for name in names.split()}
@@ -73,6 +74,7 @@ __all__ = [
     "Contact",
     "Crossings",
     "DiscreteLagrangian",
+    "EndSensitivity",
     "Ensemble",
     "EnsembleGradient",
     "EnsembleSensitivity",
@@ -84,6 +86,7 @@ __all__ = [
     "HamiltonianGeometry",
     "Interrupted",
     "LyapunovExponents",
+    "Method",
     "MemberCrossings",
     "MemberResets",
     "Path",
@@ -112,6 +115,7 @@ __all__ = [
     "integrators",
     "is_contact",
     "lattice",
+    "method",
     "path",
     "retract",
     "rigid_bodies",

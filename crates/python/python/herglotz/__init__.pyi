@@ -197,6 +197,12 @@ class Solution:
     def to_pandas(self) -> Any: ...
     def plot(self, *names: str, ax: Any = None) -> Any: ...
 
+class EndSensitivity(NamedTuple):
+    q: Vector
+    v: Vector
+    p: Vector
+    z: Vector
+
 class Sensitivity(NamedTuple):
     q: Vector
     v: Vector
@@ -204,6 +210,8 @@ class Sensitivity(NamedTuple):
     z: Vector
     growth: float
     t0: float
+    event_times: list[Vector] | dict[str, Vector]
+    end: EndSensitivity
 
 class Gradient(NamedTuple):
     q0: Vector
@@ -215,6 +223,12 @@ class Gradient(NamedTuple):
     t_end: float
     growth: float
     unresolved: str | None = None
+
+class Method:
+    function: Callable[..., Any]
+    order: int
+    name: str
+    symmetric: bool
 
 class LyapunovExponents(NamedTuple):
     exponents: Vector
@@ -507,7 +521,7 @@ def solve(
     p0: ArrayLike | None = None,
     z0: float = 0.0,
     accuracy: float | None = None,
-    integrator: str | None = None,
+    integrator: str | Method | None = None,
     step: float | None = None,
     steps: int | None = None,
     every: int | None = None,
@@ -692,6 +706,7 @@ def fit(
     data: Mapping[str, ArrayLike] | None = None,
     unknowns: Sequence[str] | None = None,
     *,
+    events: Mapping[str, tuple[Event | Expression, ArrayLike]] | None = None,
     t0: float | None = None,
     sigma: float | Mapping[str, ArrayLike] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -713,6 +728,8 @@ def fit(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    constraints: Constraints | None = None,
+    project: bool = False,
 ) -> Fit: ...
 def path(
     L: Lagrangian,
@@ -736,6 +753,9 @@ def is_contact(
     *,
     tolerance: float = 1e-9,
 ) -> Contact: ...
+def method(
+    function: Callable[..., Any], order: int, *, name: str | None = None, symmetric: bool = False
+) -> Method: ...
 def check(
     L: Lagrangian,
     q0: ArrayLike | None = None,
@@ -746,7 +766,7 @@ def check(
     z0: float = 0.0,
     places: int = 10,
     accuracy: float | None = None,
-    integrator: str | None = None,
+    integrator: str | Method | None = None,
     step: float | None = None,
     steps: int | None = None,
     events: Events = (),
@@ -765,6 +785,7 @@ def compare(
     *,
     p0: ArrayLike | None = None,
     z0: float = 0.0,
+    method: Method | None = None,
     coordinates: Sequence[Any] | str | None = None,
     parameters: Mapping[str, float] | None = None,
     force: Force | None = None,

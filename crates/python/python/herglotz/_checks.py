@@ -7,6 +7,7 @@ import numpy as np
 from . import _core, _trace
 from ._additions import breaks_of
 from ._events import events_of, texts_of_events
+from ._method import integrator_of
 from ._solve import functions_of, system_and_start
 from ._system import check_used, system_of, with_tables
 
@@ -194,6 +195,8 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events=())
     events = events_of(events, L, found) if events else []
     L = with_tables(L, found)
     check_used(L, parameters, tables, given, list(texts_of_events(events)))
+    accuracy, integrator, *steps = way
+    way = (accuracy, integrator_of(integrator, L), *steps)
     return L, _core.Motion(L, start, t, None, way, events, [], False, False, None)
 
 
@@ -287,6 +290,7 @@ def compare(
     *,
     p0=None,
     z0=0.0,
+    method=None,
     coordinates=None,
     parameters=None,
     force=None,
@@ -296,12 +300,12 @@ def compare(
 ):
     """Run time against error for all integrators that apply to a motion; the arguments are those of `solve`.
 
-    ``left_out`` has the reasons why others do not apply, and ``losses`` what a motion with a force loses.
+    With `method`, a discrete Lagrangian of one's own is measured beside them. ``left_out`` has the reasons why others do not apply, and ``losses`` what a motion with a force loses.
 
     Returns
     -------
     Comparison
     """
     more = force, rayleigh, tables, breaks
-    of, motion = _motion(L, q0, v0, t, p0, z0, (None, None, None, None), coordinates, parameters, more)
+    of, motion = _motion(L, q0, v0, t, p0, z0, (None, method, *((None, None) if method is None else (1.0, None))), coordinates, parameters, more)
     return Comparison(*_core.compare(motion), of.losses)

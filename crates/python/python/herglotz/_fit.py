@@ -113,6 +113,7 @@ def fit(
     data=None,
     unknowns=None,
     *,
+    events=None,
     t0=None,
     sigma=None,
     bounds=None,
@@ -134,6 +135,8 @@ def fit(
     rayleigh=None,
     tables=None,
     breaks=None,
+    constraints=None,
+    project=False,
 ):
     """Fits parameters and the start of a motion to data, with the exact Jacobian of the computed motion.
 
@@ -142,7 +145,8 @@ def fit(
 
     Parameters
     ----------
-    L, q0, v0, p0, z0, accuracy, integrator, step, steps, scales, coordinates, parameters, force, rayleigh, tables, breaks
+    L, q0, v0, p0, z0, accuracy, integrator, step, steps, scales, coordinates, parameters, force, rayleigh, tables, breaks,
+    constraints, project
         As in `solve`. Without an integrator it is a Gauss method, whose steps have derivatives.
     t : array of shape (k,)
         The times of the data.
@@ -151,8 +155,12 @@ def fit(
         it was not measured.
     unknowns : list of str
         What is fitted: parameters, and coordinates ``x``, velocities ``x'``, momenta ``p_x`` and ``z`` of the start.
+    events : dict, optional
+        Measured times of events, such as bounces or passages of a pendulum: a name with a pair of the `Event`, or its function,
+        and the times of its sign changes from the first one on; NaN for one that was not measured. `t` and `data` may then be
+        left out.
     t0 : float, optional
-        The time of the start; the first of `t` by default.
+        The time of the start; the first of `t` by default, or 0 where only times of events are fitted.
     sigma : float, or dict of floats or arrays, optional
         The standard deviations of all data, or of each quantity. Without it all data have the same weight.
     absolute_sigma : bool
@@ -189,23 +197,42 @@ def fit(
     ...                parameters={"k": 1.5, "gamma": -0.1})
     >>> round(found["k"], 9), round(found["gamma"], 9)
     (2.0, -0.3)
+
+    The restitution and the field of a ball, from the sounds of its bounces:
+
+    >>> floor = hz.Event("x", "falling", reset={"x'": "-e*x'"})
+    >>> found = hz.fit("x'^2/2 - g*x", [1.0], [0.0], unknowns=["e", "g"], coordinates=["x"], t0=0.0,
+    ...                events={"bounce": (floor, [0.45, 1.17, 1.75, 2.21])}, parameters={"e": 0.7, "g": 9.0})
+    >>> round(found["e"], 3), round(found["g"], 2)
+    (0.8, 9.84)
     """
-    times = _vector("t", t)
-    if not np.isfinite(times).all() or not len(times):
-        raise ValueError("`t` must be the times of the data, finite numbers")
-    t0 = float(times[0]) if t0 is None else t0
-    if not hasattr(data, "items") or not data:
-        raise ValueError(f'`data` is {data!r}; it must give values by name, as in data={{"x": x}}')
+    if events is not None and t is None and data is None:
+        times, data = np.empty(0), {}
+        t0 = 0.0 if t0 is None else t0
+    else:
+        times = _vector("t", t)
+        if not np.isfinite(times).all() or not len(times):
+            raise ValueError("`t` must be the times of the data, finite numbers")
+        t0 = float(times[0]) if t0 is None else t0
+        if not hasattr(data, "items") or not data:
+            raise ValueError(f'`data` is {data!r}; it must give values by name, as in data={{"x": x}}')
+    events = _events(events, data)
     if isinstance(unknowns, str) or not unknowns or not all(isinstance(name, str) for name in unknowns):
         raise ValueError(f'`unknowns` is {unknowns!r}; it must be a list of names, as in ["gamma", "x"]')
-    end = float(times.max())
+    end = max([*times.tolist(), *(x for _, of in events.values() for x in of.tolist() if x == x)])
     if not end > t0:
         raise ValueError(f"the last of the data is at t = {end}, but the motion starts at {t0}; give data at later times")
     of, request, *_ = request_of(
-        L, q0, v0, [t0, end], p0, z0, accuracy, integrator, step, steps, None, (), None, False, False, scales,
-        coordinates, parameters, force, rayleigh, tables, breaks, also=[str(name) for name in data],
+        L, q0, v0, [t0, end], p0, z0, accuracy, integrator, step, steps, None,
+        {name: event for name, (event, _) in events.items()}, None, False, False, scales,
+        coordinates, parameters, force, rayleigh, tables, breaks,
+        constraints=constraints, project=project, also=[str(name) for name in data],
     )  # fmt: skip
-    series = [_series(name, values, times, sigma, data) for name, values in data.items()]
+    names = [*data, *events]
+    series = [_series(name, values, times, sigma, names) for name, values in data.items()]
+    for k, (name, (_, values)) in enumerate(events.items()):
+        numbers = np.flatnonzero(~np.isnan(values)).tolist()
+        series.append((*_series(name, values, values, sigma, names)[:4], (k, numbers)))
     bounded = _bounds(bounds, unknowns)
     if absolute_sigma and any(deviations is None for *_, deviations in series):
         raise ValueError("`absolute_sigma` is given without `sigma` of all data: give it, or remove `absolute_sigma`")
@@ -223,7 +250,7 @@ def fit(
         max_evaluations,
         bool(absolute_sigma),
     )
-    return Fit(of, list(data), record)
+    return Fit(of, names, record)
 
 
 def _vector(name, x):
@@ -233,6 +260,27 @@ def _vector(name, x):
         found = None
     if found is None or found.ndim != 1:
         raise ValueError(f"`{name}` must be a list of numbers")
+    return found
+
+
+def _events(events, data):
+    """Events with the times of their sign changes, by name."""
+    if events is None:
+        return {}
+    form = "it must give pairs by name, as in events={\"bounce\": (hz.Event(...), times)}"
+    if not hasattr(events, "items") or not events:
+        raise ValueError(f"`events` is {events!r}; {form}")
+    found = {}
+    for name, pair in events.items():
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise ValueError(f"events[{name!r}] is {pair!r}; {form}")
+        if name in data:
+            raise ValueError(f"`events` and `data` have both {name!r}; give one of them another name")
+        times = _vector(f"the times of events[{name!r}]", pair[1])
+        known = times[~np.isnan(times)]
+        if not len(known) or not np.isfinite(known).all() or (np.diff(known) <= 0).any():
+            raise ValueError(f"the times of events[{name!r}] must be finite and ascend; give NaN for one that was not measured")
+        found[str(name)] = pair[0], times
     return found
 
 
@@ -257,7 +305,7 @@ def _series(name, values, times, sigma, data):
         if not (deviations > 0).all():
             raise ValueError(f"the sigma of {name!r} must be positive")
         deviations = deviations.tolist()
-    return name, times[known].tolist(), values[known].tolist(), deviations
+    return name, times[known].tolist(), values[known].tolist(), deviations, None
 
 
 def _bounds(bounds, unknowns):

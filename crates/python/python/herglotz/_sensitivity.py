@@ -10,10 +10,21 @@ from ._solve import request_of, solve
 from ._watch import watch_of
 
 
+class EndSensitivity(NamedTuple):
+    """The derivatives of the state that a motion has reached, `Solution.end`; see `Sensitivity`."""
+
+    q: np.ndarray  # (n,) or (n, m)
+    v: np.ndarray  # (n,) or (n, m)
+    p: np.ndarray  # (n,) or (n, m)
+    z: np.ndarray  # () or (m,)
+
+
 class Sensitivity(NamedTuple):
     """The derivatives of the k rows of a motion with respect to a variable, or to m of them; see `Solution.sensitivity`.
 
-    The times of the rows are fixed, except that of the final time where it is the variable. Derivatives in the start are
+    The times of the rows are fixed, except that of the final time where it is the variable, and that of a terminal event,
+    with which the end moves. `event_times` are the derivatives of the times of events and resets, a list or dict as
+    `Solution.events`, each of shape (c,) or (c, m). Derivatives in the start are
     those in the state at `t0`, where this motion starts: a motion from `Solution.resume` starts at the end of the one
     before. Round-off of the derivatives is amplified by `growth`, the largest derivative along the motion divided by the
     largest one at its end, at least one.
@@ -25,6 +36,8 @@ class Sensitivity(NamedTuple):
     z: np.ndarray  # (k,) or (k, m)
     growth: float
     t0: float
+    event_times: list | dict  # of (c,) or (c, m)
+    end: EndSensitivity
 
 
 class Gradient(NamedTuple):
@@ -84,13 +97,22 @@ def sensitivity(sol, variables):
     """See `Solution.sensitivity`."""
     names, is_one = names_of_variables(variables)
     _check(sol)
-    (q, v, p), z, growth = _core.sensitivity(_core.Motion(sol.system, *sol._request), names, sol.t.tolist())
-    shape = len(sol.t), len(names), sol.system.dimension
+    times, events = sol.t.tolist(), sol.events
+    if not times or times[-1] != sol.t_end:
+        times.append(sol.t_end)
+    of_events = list(events.values() if isinstance(events, dict) else events)
+    crossings = [(i, t) for i, of in enumerate(of_events) for t in of.t.tolist()]
+    (q, v, p), z, growth, slopes = _core.sensitivity(_core.Motion(sol.system, *sol._request), names, times, crossings)
+    shape = len(times), len(names), sol.system.dimension
     q, v, p = (x.reshape(shape).transpose(0, 2, 1) for x in (q, v, p))
-    z = z.reshape(shape[:2])
+    z, slopes = z.reshape(shape[:2]), slopes.reshape(len(crossings), len(names))
     if is_one:
-        q, v, p, z = q[:, :, 0], v[:, :, 0], p[:, :, 0], z[:, 0]
-    return Sensitivity(q, v, p, z, growth, start_time(sol._request))
+        q, v, p, z, slopes = q[:, :, 0], v[:, :, 0], p[:, :, 0], z[:, 0], slopes[:, 0]
+    event_times = np.split(slopes, np.cumsum([len(of.t) for of in of_events])[:-1]) if of_events else []
+    if isinstance(events, dict):
+        event_times = dict(zip(events, event_times))
+    end, k = EndSensitivity(q[-1], v[-1], p[-1], z[-1]), len(sol.t)
+    return Sensitivity(q[:k], v[:k], p[:k], z[:k], growth, start_time(sol._request), event_times, end)
 
 
 def start_time(request):

@@ -261,7 +261,18 @@ class Solution(Rows):
         Returns
         -------
         Sensitivity
-            q, v, p, z: of shapes (k, n) and (k,) for one name, (k, n, m) and (k, m) for a list.
+            q, v, p, z: of shapes (k, n) and (k,) for one name, (k, n, m) and (k, m) for a list; with the derivatives of
+            the times of events, and of the end.
+
+        Examples
+        --------
+        How the times of bounces, 2 v/g apart, depend on the restitution:
+
+        >>> import herglotz as hz
+        >>> floor = hz.Event("x", "falling", reset={"x'": "-e*x'"})
+        >>> sol = hz.solve("x'^2/2 - 2*x", [0.0], [2.0], 3.6, coordinates=["x"], parameters={"e": 0.5}, events=floor)
+        >>> sol.events[0].t.round(9), sol.sensitivity("e").event_times[0].round(9)
+        (array([2. , 3. , 3.5]), array([0., 2., 4.]))
         """
         from ._sensitivity import sensitivity
 

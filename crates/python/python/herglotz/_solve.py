@@ -5,6 +5,7 @@ import numpy as np
 from . import _core
 from ._additions import breaks_of
 from ._events import events_of, texts_of_events
+from ._method import integrator_of
 from ._solution import Interrupted, Solution
 from ._system import check_used, copied, expression, system_of, warn_of_gain, with_tables
 from ._watch import NOTHING, watch_of
@@ -68,8 +69,8 @@ def solve(
     accuracy : float, optional
         The requested error, by default 1e-9: that of (q, p) relative to its size, and that of v relative to the largest
         speed. The step is chosen for it, and also the integrator where none is named.
-    integrator : str, optional
-        One of the names that `integrators` returns.
+    integrator : str or Method, optional
+        One of the names that `integrators` returns, or a discrete Lagrangian of one's own; see `method`.
     step, steps : float, int, optional
         The length or the number of steps of `integrator`, in place of an accuracy.
     every : int, optional
@@ -183,7 +184,7 @@ def request_of(
         (copied(q0), copied(v0), False, z0, None) if p0 is None else (copied(q0), copied(p0), True, z0, None),
         copied(t),
         every,
-        (accuracy, integrator, step, steps),
+        (accuracy, integrator_of(integrator, L), step, steps),
         given_events,
         columns,
         conformal_factor,

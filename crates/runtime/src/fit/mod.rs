@@ -1,5 +1,6 @@
 //! Fits of motions to data.
 
+mod event_series;
 mod model;
 mod result;
 
@@ -42,13 +43,34 @@ pub struct Series {
     pub values: Vec<f64>,
     /// The standard deviations of the values; without them all values have weight 1.
     pub deviations: Option<Vec<f64>>,
+    /// Where the values are the times of sign changes of an event: which ones. The quantity is then a name of the series, and
+    /// `times` are the values.
+    pub event: Option<SignChanges>,
+}
+
+/// Sign changes of an event of a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SignChanges {
+    /// The index of the event.
+    pub event: usize,
+    /// The number of each of them in the order of the motion, from 0, in ascending order.
+    pub numbers: Vec<usize>,
+}
+
+impl Series {
+    /// Measured times of the first sign changes of an event, with a name.
+    pub fn of_event(name: impl Into<String>, event: usize, times: impl Into<Vec<f64>>) -> Self {
+        let times = times.into();
+        let event = Some(SignChanges { event, numbers: (0..times.len()).collect() });
+        Series { quantity: name.into(), values: times.clone(), times, deviations: None, event }
+    }
 }
 
 /// A fit of a motion to data; see [`System::fit`].
 #[derive(Clone, Debug)]
 pub struct MotionFit {
-    /// The motion whose start, with the parameters of the system, is the start of the fit. Its rows and events are not
-    /// used, and its end is that of the data.
+    /// The motion whose start, with the parameters of the system, is the start of the fit. Its rows are not used, and its
+    /// end is that of the data; its events are those of series of times.
     pub motion: Motion,
     /// What is fitted.
     pub unknowns: Vec<Unknown>,
@@ -97,6 +119,7 @@ impl System {
     ///     times: vec![0.5, 1.0, 1.5, 2.0, 2.5, 3.0],
     ///     values: vec![0.886, 0.579, 0.152, -0.294, -0.657, -0.850],
     ///     deviations: None,
+    ///     event: None,
     /// };
     /// let fitted = spring.fit(&MotionFit::new(motion, ["k", "c"].map(Unknown::free), [data]), &mut ())?;
     /// println!("{}", fitted.fit);

@@ -1,27 +1,31 @@
 //! The model of a fit: quantities of a motion as functions of its unknowns.
 
+use super::event_series::{LATER, SignChange, event_time};
 use super::{Fit, FitError, FittedMotion, FittedSeries, METHOD, MotionFit, MultiStart};
+use crate::kernel::{Differentiated, of_expression};
 use crate::{
-    Column, InitialVelocity, Motion, RunMonitor, RuntimeError, Start, StateDerivative, StepControl, System,
+    Column, Event, InitialVelocity, Motion, RunMonitor, RuntimeError, Start, StateDerivative, StepControl, System,
     velocity_name,
 };
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
 use discrete_herglotz::{Status, Steps, Vector};
-use formula_lagrangian::{Expression, ExpressionGradient};
+use formula_lagrangian::Expression;
 use herglotz_fit::{DMatrix, Model, ModelFailure, Observation, Piece, PieceValues, PiecewiseModel, ShootingFit};
 use std::cell::{Cell, RefCell};
 
 /// What is observed.
-enum Quantity {
+pub(super) enum Quantity {
     /// A number of the state.
     Number(Part, usize),
     /// An expression of the state.
     Expression(Box<Expression>),
+    /// The time of a sign change of the event with this index.
+    EventTime(usize),
 }
 
 /// A part of a state.
 #[derive(Clone, Copy)]
-enum Part {
+pub(super) enum Part {
     Position,
     Velocity,
     Momentum,
@@ -51,25 +55,30 @@ pub(super) struct FitModel<'a> {
     quantities: Vec<Quantity>,
     /// The time of each value, and the index of its quantity.
     observed: Vec<(f64, usize)>,
-    monitor: RefCell<&'a mut dyn RunMonitor>,
+    /// The number of the sign change of each value that is the time of one, in the order of the motion; 0 for others.
+    numbers: Vec<usize>,
+    pub(super) monitor: RefCell<&'a mut dyn RunMonitor>,
     /// Whether the monitor has ended a motion: all further ones are then refused.
-    is_interrupted: Cell<bool>,
+    pub(super) is_interrupted: Cell<bool>,
     /// The error of a motion that has no derivatives, whatever the unknowns.
     no_tangent: RefCell<Option<RuntimeError>>,
 }
 
 impl<'a> FitModel<'a> {
     pub fn new(system: &'a System, request: &MotionFit, monitor: &'a mut dyn RunMonitor) -> Result<Self, RuntimeError> {
-        crate::kernel::refuse_constraints(system.formula(), "fits")?;
         let t0 = request.motion.start.t;
         let unknowns = request.unknowns.iter().map(|unknown| unknown_of(system, &unknown.name));
         let unknowns = unknowns.collect::<Result<Vec<_>, _>>()?;
         check_kind(&request.motion.start, &unknowns)?;
-        let quantities = request.series.iter().map(|series| quantity(system, &series.quantity));
+        let quantities = request.series.iter().map(|series| match &series.event {
+            Some(of) => event_time(&request.motion, of),
+            None => quantity(system, &series.quantity),
+        });
         let quantities = quantities.collect::<Result<Vec<_>, _>>()?;
-        let mut observed = Vec::new();
+        let (mut observed, mut numbers) = (Vec::new(), Vec::new());
         for (k, series) in request.series.iter().enumerate() {
-            let counts = [Some(series.values.len()), series.deviations.as_ref().map(Vec::len)];
+            let of_event = series.event.as_ref().map(|of| &of.numbers);
+            let counts = [Some(series.values.len()), series.deviations.as_ref().map(Vec::len), of_event.map(Vec::len)];
             if let Some(found) = counts.into_iter().flatten().find(|count| *count != series.times.len()) {
                 return Err(FitError::Count { what: "values of a series", found, expected: series.times.len() }.into());
             }
@@ -77,16 +86,28 @@ impl<'a> FitModel<'a> {
                 return Err(FitError::Time { index, t: series.times[index], t0 }.into());
             }
             observed.extend(series.times.iter().map(|t| (*t, k)));
+            numbers.extend((0..series.times.len()).map(|i| of_event.and_then(|all| all.get(i)).copied().unwrap_or(0)));
         }
         let end = observed.iter().fold(t0, |end, (t, _)| end.max(*t));
         if end == t0 {
             return Err(FitError::NoTimes { t0 }.into());
         }
+        if system.formula().constraints() > 0 && !request.nodes.is_empty() {
+            let why = "cut a motion with constraints, whose state there has fewer unknowns than numbers; fit it without nodes";
+            return Err(RuntimeError::argument("nodes", why));
+        }
+        let has_events = request.series.iter().any(|series| series.event.is_some());
+        if has_events && !request.nodes.is_empty() {
+            let why = "cut a motion whose times of events are fitted; fit them without nodes";
+            return Err(RuntimeError::argument("nodes", why));
+        }
+        // Sign changes may be later until the unknowns are found.
+        let end = if has_events { end + LATER * (end - t0) } else { end };
         let motion = Motion {
             end,
             rows: None,
             columns: Vec::new(),
-            events: Vec::new(),
+            events: if has_events { request.motion.events.clone() } else { Vec::new() },
             conformal_factor: false,
             estimate: false,
             ..request.motion.clone()
@@ -98,6 +119,7 @@ impl<'a> FitModel<'a> {
             unknowns,
             quantities,
             observed,
+            numbers,
             monitor: RefCell::new(monitor),
             is_interrupted: Cell::new(false),
             no_tangent: RefCell::new(None),
@@ -281,15 +303,25 @@ impl PiecewiseModel for FitModel<'_> {
         };
         let (variables, places) = self.variables(piece.from.is_none());
         let variables = if piece.is_differentiated { variables } else { Vec::new() };
-        let mut times: Vec<f64> = piece.values.iter().map(|i| self.observed[*i].0).chain(piece.to).collect();
+        let is_event = |i: &&usize| matches!(self.quantities[self.observed[**i].1], Quantity::EventTime(_));
+        let of_state = piece.values.iter().filter(|i| !is_event(i));
+        let mut times: Vec<f64> = of_state.map(|i| self.observed[*i].0).chain(piece.to).collect();
         times.sort_by(f64::total_cmp);
         times.dedup();
         let mut found = PieceValues::new(self, piece);
-        let Some(end) = times.last().copied() else { return Ok(found) };
-        let motion = Motion { start, end, ..self.motion.clone() };
+        let wanted: Vec<SignChange> = piece.values.iter().filter(is_event).map(|i| self.sign_change(*i)).collect();
+        let end = if wanted.is_empty() { times.last().copied() } else { Some(self.motion.end) };
+        let Some(end) = end else { return Ok(found) };
+        let mut motion = Motion { start, end, ..self.motion.clone() };
+        for (name, value) in &parameters {
+            let expressions = motion.events.iter_mut().flat_map(Event::expressions_mut);
+            expressions.into_iter().try_for_each(|expression| expression.set(name, *value)).map_err(undefined)?;
+        }
+        let crossings = if wanted.is_empty() { Vec::new() } else { self.crossings(&system, &motion, &wanted)? };
         let rows = {
             let mut monitor = self.monitor.borrow_mut();
-            system.kernel.sensitivity(&motion, &variables, &times, &mut **monitor)
+            let of = Differentiated { variables: &variables, times: &times, crossings: &crossings };
+            system.kernel.sensitivity(&motion, of, &mut **monitor)
         };
         let rows = rows.map_err(|error| {
             let failure = undefined(&error);
@@ -309,8 +341,15 @@ impl PiecewiseModel for FitModel<'_> {
             return Err(undefined(unresolved));
         }
         let expressions = self.expressions_at(&parameters)?;
+        let mut of_events = crossings.iter().zip(&rows.event_times);
         for (row, i) in piece.values.iter().enumerate() {
             let (t, quantity) = self.observed[*i];
+            if let Quantity::EventTime(_) = &self.quantities[quantity] {
+                if let Some((at, slopes)) = of_events.next() {
+                    found.set(row, at.t, places.iter().copied().zip(slopes.iter().copied()));
+                }
+                continue;
+            }
             let at = times.partition_point(|time| *time < t);
             let (Some(state), Some(columns)) = (rows.states.get(at), rows.rows.get(at)) else { continue };
             let (value, slopes): (f64, Vec<f64>) = match (&self.quantities[quantity], &expressions[quantity]) {
@@ -319,16 +358,15 @@ impl PiecewiseModel for FitModel<'_> {
                     (part.of([&state.q, &state.v, &state.p], state.z, *i), columns.iter().map(of).collect())
                 }
                 (Quantity::Expression(_), Some(expression)) => {
-                    let gradient = expression.gradient_at(state.t, &state.q, &state.v, state.z);
-                    let slope = |(column, variable)| self.along(&gradient, variable, column);
-                    (gradient.value, columns.iter().zip(&variables).map(slope).collect())
+                    let (value, of_state, of_parameters) = of_expression(expression, state);
+                    let slope = |(column, variable): (&StateDerivative, &Variable)| {
+                        column.dot(&of_state) + self.explicit(&of_parameters, variable)
+                    };
+                    (value, columns.iter().zip(&variables).map(slope).collect())
                 }
-                (Quantity::Expression(_), None) => continue,
+                (Quantity::Expression(_), None) | (Quantity::EventTime(_), _) => continue,
             };
-            found.values[row] = value;
-            for (place, slope) in places.iter().zip(slopes) {
-                found.derivatives[(row, *place)] = slope;
-            }
+            found.set(row, value, places.iter().copied().zip(slopes));
         }
         if let (Some(_), Some(state), Some(columns)) = (piece.to, rows.states.last(), rows.rows.last()) {
             let numbers = |q: &Vector, v: &Vector, z: f64| q.iter().chain(v).copied().chain([z]).collect::<Vec<_>>();
@@ -359,17 +397,24 @@ impl FitModel<'_> {
         self.quantities.iter().map(of).collect()
     }
 
-    /// The derivative of an expression along that of the state, and in the variable itself where it is a parameter.
-    fn along(&self, gradient: &ExpressionGradient, variable: &Variable, column: &StateDerivative) -> f64 {
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let of_state = dot(&gradient.q, &column.q) + dot(&gradient.v, &column.v) + gradient.z * column.z;
-        let Variable::Parameter(name) = variable else { return of_state };
+    /// The sign change of which a value is the time.
+    fn sign_change(&self, value: usize) -> SignChange {
+        let event = match self.quantities[self.observed[value].1] {
+            Quantity::EventTime(event) => event,
+            _ => usize::MAX,
+        };
+        SignChange { event, number: self.numbers[value] }
+    }
+
+    /// The partial derivative of an expression in a variable, where that is a parameter.
+    fn explicit(&self, of_parameters: &[f64], variable: &Variable) -> f64 {
+        let Variable::Parameter(name) = variable else { return 0.0 };
         let index = self.system.formula().parameters().position(|(parameter, _)| parameter == name);
-        of_state + index.and_then(|i| gradient.parameters.get(i)).copied().unwrap_or(0.0)
+        index.and_then(|i| of_parameters.get(i)).copied().unwrap_or(0.0)
     }
 }
 
-fn undefined(cause: impl std::fmt::Display) -> ModelFailure {
+pub(super) fn undefined(cause: impl std::fmt::Display) -> ModelFailure {
     ModelFailure::Undefined(cause.to_string())
 }
 

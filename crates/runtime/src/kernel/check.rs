@@ -1,12 +1,14 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
 use super::Kernel;
+use super::discrete::custom;
 use super::formula_system::FormulaSystem;
-use super::many::{ManyCoordinates, gauss};
+use super::many::{ManyCoordinates, few, gauss};
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
 use crate::{
-    Check, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual, StepControl,
+    Check, FormulaMethod, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual,
+    StepControl,
 };
 use contact_geom::{
     Lagrangian, OneParameterGroup, PhasePoint, Statement,
@@ -49,20 +51,39 @@ const MOST_STAGES_WITH_CONSTRAINTS: usize = 7;
 /// A sample of a motion: the time, the state, and the logarithm of the conformal factor.
 type StateAt = (f64, State, f64);
 
-/// The steps of a map: the integrator, or `None` for that which the constraints choose, the length of a step, and the
-/// number of steps.
-type MapOfSteps = (Option<AnyIntegrator>, f64, usize);
+/// The integrator of a map: the one with this name, or `None` for that which the constraints choose; or a discrete Lagrangian
+/// of one's own.
+#[derive(Clone, Debug)]
+enum MapBy {
+    Named(Option<AnyIntegrator>),
+    Method(FormulaMethod),
+}
+
+impl MapBy {
+    fn gauss(stages: usize) -> Self {
+        MapBy::Named(Some(AnyIntegrator::Gauss { stages }))
+    }
+}
+
+/// The steps of a map: the integrator, the length of a step, and the number of steps.
+type MapOfSteps<'b> = (&'b MapBy, f64, usize);
 
 /// The maps of a system: the start, the end and the conformal factor of one at a state, which is first moved to the
 /// constraints, if there are any.
-type Maps<'m> = dyn Fn(MapOfSteps, f64, &State) -> Result<([State; 2], f64), RuntimeError> + 'm;
+type Maps<'m> = dyn Fn(MapOfSteps<'_>, f64, &State) -> Result<([State; 2], f64), RuntimeError> + 'm;
 
 /// The run of a number of steps by an integrator, or by the one for the constraints.
 fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     problem: &'p Problem<'p, L, N>,
-    by: Option<AnyIntegrator>,
+    by: &MapBy,
     count: usize,
 ) -> Result<Run<'p, 'o, Problem<'p, L, N>>, RuntimeError> {
+    let by = match by {
+        MapBy::Named(by) => *by,
+        MapBy::Method(method) => {
+            return Ok(problem.by(custom(method, problem.lagrangian())?).steps(Steps::Count(count)));
+        }
+    };
     Ok(match (problem.lagrangian().constrained(by)?, by) {
         (Some(method), _) => problem.by(method).steps(Steps::Count(count)),
         (None, Some(by)) => problem.by(L::by(by)?).steps(Steps::Count(count)),
@@ -73,7 +94,7 @@ fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
 /// See [`Maps`].
 fn mapped<L: FormulaSystem<N>, const N: usize>(
     lagrangian: &L,
-    (by, h, count): MapOfSteps,
+    (by, h, count): MapOfSteps<'_>,
     t: f64,
     from: &State,
 ) -> Result<([State; 2], f64), RuntimeError> {
@@ -88,7 +109,7 @@ fn mapped<L: FormulaSystem<N>, const N: usize>(
 }
 
 /// The state after a time h in `count` steps, and the conformal factor of the last step.
-fn step(maps: &Maps<'_>, map: MapOfSteps, t: f64, from: &State) -> Result<(State, f64), RuntimeError> {
+fn step(maps: &Maps<'_>, map: MapOfSteps<'_>, t: f64, from: &State) -> Result<(State, f64), RuntimeError> {
     let ([_, end], sigma) = maps(map, t, from)?;
     Ok((end, sigma))
 }
@@ -100,7 +121,7 @@ fn numbers(State { q, p, z }: &State) -> Vec<f64> {
 
 /// The distance of the pullback of `dz - p dq` by a step from `sigma (dz - p dq)`, relative to its size: by derivatives
 /// along curves of starts. With constraints these are curves in T\*N x R, whose tangent vectors are all of them.
-fn contact_defect(maps: &Maps<'_>, map: MapOfSteps, t: f64, at: &State) -> Result<f64, RuntimeError> {
+fn contact_defect(maps: &Maps<'_>, map: MapOfSteps<'_>, t: f64, at: &State) -> Result<f64, RuntimeError> {
     let n = at.q.len();
     let ([from, end], sigma) = maps(map, t, at)?;
     let size = |x: f64| if x > 0.0 { x } else { 1.0 };
@@ -138,12 +159,13 @@ fn contact_defect(maps: &Maps<'_>, map: MapOfSteps, t: f64, at: &State) -> Resul
 fn herglotz_defect(
     maps: &Maps<'_>,
     constrained: bool,
-    map: MapOfSteps,
+    map: MapOfSteps<'_>,
     t: f64,
     at: &State,
 ) -> Result<f64, RuntimeError> {
     let stages = if constrained { MOST_STAGES_WITH_CONSTRAINTS } else { MOST_STAGES };
-    let exact = (Some(AnyIntegrator::Gauss { stages }), map.1, 2);
+    let by = MapBy::gauss(stages);
+    let exact = (&by, map.1, 2);
     let (a, b) = (numbers(&step(maps, map, t, at)?.0), numbers(&step(maps, exact, t, at)?.0));
     let size = |x: &[f64]| max_abs_or_nan(x.iter().copied());
     let apart = max_abs_or_nan(a.iter().zip(&b).map(|(a, b)| a - b));
@@ -196,14 +218,14 @@ fn along<L: FormulaSystem<N>, const N: usize>(
     let problem = system.problem_of(motion)?;
     let states = vec![(motion.start.t, problem.state().into(), 0.0)];
     let mut record = Recorded { states, stride: plan.steps.div_ceil(samples.max(1)), motion };
-    run_by(&problem, by, plan.steps)?.with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
+    run_by(&problem, &by, plan.steps)?.with_conformal_factor().observe(&mut record).run(Until::Time(motion.end))?;
     let states = record.states;
     let momenta = |x: &State| {
         let PhasePoint { q, p, .. } = x.fixed();
         symmetries.iter().map(|s| s.momentum(&q, &p)).collect()
     };
-    let maps = |map: MapOfSteps, t: f64, from: &State| mapped(lagrangian, map, t, from);
-    let samples = samples_at(&states, &maps, (formula.constraints() > 0, (by, plan.step_size, 1)), &momenta, motion)?;
+    let maps = |map: MapOfSteps<'_>, t: f64, from: &State| mapped(lagrangian, map, t, from);
+    let samples = samples_at(&states, &maps, (formula.constraints() > 0, (&by, plan.step_size, 1)), &momenta, motion)?;
     Ok((checked(formula, lagrangian.has_force(), &plan, samples), states, plan.integrator.collocation))
 }
 
@@ -221,20 +243,23 @@ fn checked(formula: &Formula, has_force: bool, plan: &Plan, samples: Vec<Sample>
 pub(super) fn of_many(system: &ManyCoordinates, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
     let (plan, formula) = (Kernel::plan(system, motion)?, Kernel::formula(system));
     let by = integrator(formula, motion, &plan)?;
-    let stages = |by: Option<AnyIntegrator>| by.map_or(Ok(GaussCollocation { stages: MOST_STAGES }), gauss);
+    let stages = |by: &MapBy| match by {
+        MapBy::Named(by) => Ok(by.map_or(Ok(GaussCollocation { stages: MOST_STAGES }), gauss)?),
+        MapBy::Method(_) => Err(few("methods of one's own")),
+    };
     let problem = system.problem(motion)?;
     let states = vec![(motion.start.t, problem.state().clone(), 0.0)];
     let mut record = Recorded { states, stride: plan.steps.div_ceil(samples.max(1)), motion };
-    let run = problem.by(stages(by)?).steps(Steps::Count(plan.steps)).with_conformal_factor();
+    let run = problem.by(stages(&by)?).steps(Steps::Count(plan.steps)).with_conformal_factor();
     run.observe(&mut record).run(Until::Time(motion.end))?;
-    let maps = |(by, h, count): MapOfSteps, t: f64, from: &State| {
+    let maps = |(by, h, count): MapOfSteps<'_>, t: f64, from: &State| {
         let problem = SystemProblem::new(system, t, from.clone())?;
         let plan = problem.by(stages(by)?).steps(Steps::Count(count)).plan(Until::After(h))?;
         let mut stepper = plan.stepper()?;
         stepper.advance(count).map_err(|failure| failure.cause)?;
         Ok(([problem.state().clone(), stepper.state()], stepper.sigma()))
     };
-    let samples = samples_at(&record.states, &maps, (false, (by, plan.step_size, 1)), &|_| Vec::new(), motion)?;
+    let samples = samples_at(&record.states, &maps, (false, (&by, plan.step_size, 1)), &|_| Vec::new(), motion)?;
     Ok(checked(formula, Kernel::has_force(system), &plan, samples))
 }
 
@@ -242,7 +267,7 @@ pub(super) fn of_many(system: &ManyCoordinates, motion: &Motion, samples: usize)
 fn samples_at(
     states: &[StateAt],
     maps: &Maps<'_>,
-    (constrained, map): (bool, MapOfSteps),
+    (constrained, map): (bool, MapOfSteps<'_>),
     momenta: &dyn Fn(&State) -> Vec<f64>,
     motion: &Motion,
 ) -> Result<Vec<Sample>, RuntimeError> {
@@ -267,13 +292,16 @@ fn samples_at(
     Ok(along)
 }
 
-/// The integrator of a motion; `None` for that which the constraints choose.
-fn integrator(formula: &Formula, motion: &Motion, plan: &Plan) -> Result<Option<AnyIntegrator>, RuntimeError> {
-    Ok(match motion.step_control {
+/// The integrator of a motion.
+fn integrator(formula: &Formula, motion: &Motion, plan: &Plan) -> Result<MapBy, RuntimeError> {
+    if let Some(method) = &motion.method {
+        return Ok(MapBy::Method(method.clone()));
+    }
+    Ok(MapBy::Named(match motion.step_control {
         StepControl::Steps { by, .. } | StepControl::Accuracy { by: Some(by), .. } => Some(by),
         StepControl::Accuracy { by: None, .. } if formula.constraints() > 0 => None,
         StepControl::Accuracy { by: None, .. } => Some(plan.integrator.name.parse()?),
-    })
+    }))
 }
 
 /// See [`System::modified_defects`](crate::System::modified_defects).
@@ -284,11 +312,16 @@ pub(super) fn modified_defects<L: FormulaSystem<N>, const N: usize>(
 ) -> Result<Vec<ModifiedDefect>, RuntimeError> {
     let plan = super::run::plan(system, motion)?;
     let (by, h, problem) = (integrator(system.0.formula(), motion, &plan)?, plan.step_size, system.problem_of(motion)?);
-    // Constraints are refused before.
-    let Some(by) = by.map(L::by).transpose()? else {
-        return Err(RuntimeError::WithConstraints { what: "modified Hamiltonians" });
-    };
     let span = (motion.end - motion.start.t).abs().min(MODIFIED_STEPS * h.abs());
+    let by = match by {
+        MapBy::Method(method) => {
+            let by = custom(&method, &system.0)?;
+            return Ok(hamiltonian::modified_defects(&problem, &by, span, &[h, 0.5 * h, 0.25 * h], most)?);
+        }
+        MapBy::Named(Some(by)) => L::by(by)?,
+        // Constraints are refused before.
+        MapBy::Named(None) => return Err(RuntimeError::WithConstraints { what: "modified Hamiltonians" }),
+    };
     Ok(hamiltonian::modified_defects(&problem, &by, span, &[h, 0.5 * h, 0.25 * h], most)?)
 }
 
@@ -313,7 +346,11 @@ pub(super) fn check<const N: usize>(
             Ok(VirtualWork::of_step(lagrangian, stages, h, t, &from, &guess)?.residual())
         })?
     } else {
-        let maps = |map: MapOfSteps, t: f64, from: &State| mapped(lagrangian, map, t, from);
+        let maps = |map: MapOfSteps<'_>, t: f64, from: &State| mapped(lagrangian, map, t, from);
+        if let Some(method) = &motion.method {
+            check.statements = theorems_of(method, formula, (&maps, check.step_size), &of_theorems)?;
+            return Ok(check);
+        }
         theorems_along(formula, &maps, (stages, check.step_size), &of_theorems, motion)?
     };
     Ok(check)
@@ -374,9 +411,26 @@ fn theorems_with(
     let n = formula.dimension();
     let mut points = Vec::with_capacity(samples.len());
     for (t, x, _) in samples {
-        let q1 = step(maps, (Some(AnyIntegrator::Gauss { stages }), h, 1), *t, x)?.0.q;
-        let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
-        points.push(Points { t: *t, q0, q1, z0: x.z });
+        points.push(points_of(maps, (&MapBy::gauss(stages), h, 1), (*t, x), n)?);
     }
     theorems(formula, stages, h, &points)
+}
+
+/// The largest residuals of a discrete Lagrangian of one's own, over its steps from some samples.
+fn theorems_of(
+    method: &FormulaMethod,
+    formula: &Formula,
+    (maps, h): (&Maps<'_>, f64),
+    samples: &[&StateAt],
+) -> Result<Vec<StatementResidual>, RuntimeError> {
+    let by = MapBy::Method(method.clone());
+    let points = samples.iter().map(|(t, x, _)| points_of(maps, (&by, h, 1), (*t, x), formula.dimension()));
+    super::theorems::of_method(method, h, &points.collect::<Result<Vec<_>, _>>()?)
+}
+
+/// The two positions of a step from a state.
+fn points_of(maps: &Maps<'_>, map: MapOfSteps<'_>, (t, x): (f64, &State), n: usize) -> Result<Points, RuntimeError> {
+    let q1 = step(maps, map, t, x)?.0.q;
+    let [q0, q1] = [&x.q, &q1].map(|q| coordinates(q, n).to_vec());
+    Ok(Points { t, q0, q1, z0: x.z })
 }

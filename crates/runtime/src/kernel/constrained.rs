@@ -1,13 +1,14 @@
 //! Integrators for formulas with holonomic constraints.
 
 use crate::{Motion, RuntimeError};
-use contact_geom::constraints::{Constraint, Redundancy, constrained_motion};
-use contact_geom::nalgebra::SVector;
-use contact_geom::{Lagrangian, Scalar, VelocityPoint};
+use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
+use contact_geom::nalgebra::{DMatrix, SVector};
+use contact_geom::{ChartVector, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 use discrete_herglotz::constraints::{Constrained, ConstrainedMethod, ConstrainedStart, OffConstraint};
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
-    AnyIntegrator, InputError, Integrator, MethodInfo, Problem, SplittingScheme, StepError, Stepper, StepperOptions,
+    AnyIntegrator, InputError, Integrator, MethodInfo, Problem, SplittingScheme, StartProjection, StepError,
+    StepFormula, Stepper, StepperOptions, Vector,
 };
 use formula_lagrangian::{Formula, FormulaLagrangian};
 
@@ -115,6 +116,50 @@ impl<'a, const N: usize> Integrator<'a, FormulaLagrangian<N>, N> for OfConstrain
             Err(StepError::NonFinite)
         }
     }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        Some(StepFormula::Derivatives)
+    }
+
+    fn step_jacobian(
+        &self,
+        problem: &Problem<'a, FormulaLagrangian<N>, N>,
+        h: f64,
+        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        if const { is_compiled(N) } {
+            self.with::<_, N>(problem.lagrangian()).step_jacobian(problem, h, step)
+        } else {
+            Ok(None)
+        }
+    }
+
+    fn step_variation(
+        &self,
+        problem: &Problem<'a, FormulaLagrangian<N>, N>,
+        h: f64,
+        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+        parameter: Option<usize>,
+        variation: &mut dyn FnMut(f64, &VelocityPoint<N>) -> (f64, ChartVector<N>),
+    ) -> Result<Option<ChartVector<N>>, StepError> {
+        if const { is_compiled(N) } {
+            self.with::<_, N>(problem.lagrangian()).step_variation(problem, h, step, parameter, variation)
+        } else {
+            Ok(None)
+        }
+    }
+
+    fn start_projection(
+        &self,
+        problem: &Problem<'a, FormulaLagrangian<N>, N>,
+        parameters: usize,
+    ) -> Result<Option<StartProjection>, StepError> {
+        if const { is_compiled(N) } {
+            self.with::<_, N>(problem.lagrangian()).start_projection(problem, parameters)
+        } else {
+            Ok(None)
+        }
+    }
 }
 
 /// The multipliers of the constraint force at a point of a motion; `None` where they are not determined.
@@ -128,6 +173,12 @@ pub(super) fn multipliers<const N: usize>(
     } else {
         None
     }
+}
+
+/// The force of the constraints at a point of a motion.
+pub(super) fn force<const N: usize>(lagrangian: &FormulaLagrangian<N>, t: f64, x: &VelocityPoint<N>) -> Option<Vector> {
+    let multipliers = multipliers(lagrangian, t, x)?;
+    Some((lagrangian.with_jacobian(&x.q).1.transpose() * multipliers).into())
 }
 
 /// The start of a motion, moved to the constraints.

@@ -1,13 +1,13 @@
 //! What the kernels use of a formula: a Lagrangian, or a contact Hamiltonian in its place.
 
-use super::constrained::{OfConstraints, multipliers, projected};
-use contact_geom::nalgebra::SVector;
+use super::constrained::{OfConstraints, force, multipliers, projected};
+use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{Lagrangian, OfHamiltonian, PhasePoint, Symmetry, VelocityPoint};
 use discrete_herglotz::hamiltonian::SeparableSplitting;
 use discrete_herglotz::rules::Method;
 use discrete_herglotz::{
     AnyIntegrator, DividedGauss, GaussCollocation, InputError, Integrator, MethodInfo, Point, Problem, SplittingScheme,
-    State, Stepper, StepperOptions, Vector, theory::legendre_inverse,
+    State, StepError, StepFormula, Stepper, StepperOptions, Vector, theory::legendre_inverse,
 };
 use formula_lagrangian::{Formula, FormulaError, FormulaHamiltonian, FormulaLagrangian};
 
@@ -32,6 +32,10 @@ pub(super) trait Observed {
     /// The multiplier of the constraint with this index; NaN where it is not determined.
     fn multiplier(&self, _t: f64, _x: &Point, _index: usize) -> f64 {
         f64::NAN
+    }
+    /// The force of the constraints; `None`, the default, without constraints.
+    fn constraint_force(&self, _t: f64, _x: &Point) -> Option<Vector> {
+        None
     }
 }
 
@@ -104,6 +108,10 @@ impl<const N: usize> Observed for FormulaLagrangian<N> {
 
     fn multiplier(&self, t: f64, x: &Point, index: usize) -> f64 {
         multipliers(self, t, &x.fixed()).and_then(|all| all.get(index).copied()).unwrap_or(f64::NAN)
+    }
+
+    fn constraint_force(&self, t: f64, x: &Point) -> Option<Vector> {
+        if self.formula().constraints() > 0 { force(self, t, &x.fixed()) } else { None }
     }
 }
 
@@ -215,6 +223,19 @@ impl<'a, const N: usize> Integrator<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>
         options: StepperOptions,
     ) -> Result<Box<dyn Stepper + 'a>, InputError> {
         each!(self, by => by.stepper(problem, h, options))
+    }
+
+    fn step_formula(&self) -> Option<StepFormula> {
+        each!(self, by => Integrator::<OfHamiltonian<FormulaHamiltonian<N>>, N>::step_formula(by))
+    }
+
+    fn step_jacobian(
+        &self,
+        problem: &Problem<'a, OfHamiltonian<FormulaHamiltonian<N>>, N>,
+        h: f64,
+        step: (f64, &PhasePoint<N>, &PhasePoint<N>),
+    ) -> Result<Option<DMatrix<f64>>, StepError> {
+        each!(self, by => by.step_jacobian(problem, h, step))
     }
 }
 

@@ -3,11 +3,11 @@
 
 use super::sized::{Sized, coordinates};
 use super::work_thread::on_large_stack;
-use super::{Kernel, check, ensemble, run};
+use super::{Differentiated, Kernel, check, ensemble, run, sensitivity};
 use crate::kernel::formula_system::{FormulaSystem, Observed};
 use crate::{
-    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, HamiltonianGeometry, InitialVelocity, Motion, Outcome, Plan,
-    RunMonitor, RuntimeError, Start,
+    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, HamiltonianGeometry, InitialVelocity, Loss, LossGradient,
+    LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
 };
 use contact_geom::nalgebra::{DMatrix, SVector};
 use contact_geom::{
@@ -87,6 +87,33 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
 
     fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
         ensemble::run(self, ensemble, monitor)
+    }
+
+    fn sensitivity(
+        &self,
+        motion: &Motion,
+        of: Differentiated<'_>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        sensitivity::tangent(self, motion, of, monitor)
+    }
+
+    fn gradient(
+        &self,
+        motion: &Motion,
+        times: &[f64],
+        loss: &mut Loss<'_>,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LossGradient, RuntimeError> {
+        sensitivity::gradient(self, motion, times, loss, monitor)
+    }
+
+    fn lyapunov_exponents(
+        &self,
+        motion: &Motion,
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<LyapunovExponents, RuntimeError> {
+        sensitivity::lyapunov_exponents(self, motion, monitor)
     }
 
     /// The geometry at a momentum, or at a velocity that has one.

@@ -3,9 +3,9 @@
 use super::formula_system::Observed;
 use super::recorder::Recorder;
 use super::run::{outcome_of, plan_of, requested};
-use super::sensitivity::{exponents_of, loss_gradient, sensitivity_of, unobserved};
+use super::sensitivity::{exponents_of, loss_gradient, unobserved};
 use super::sized::{checked, initial_state};
-use super::{Kernel, check, ensemble};
+use super::{Differentiated, Kernel, check, ensemble};
 use crate::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Loss, LossGradient, LyapunovExponents, Motion, Outcome, Plan,
     RunMonitor, RuntimeError, Sensitivity, StepControl,
@@ -14,7 +14,7 @@ use contact_geom::nalgebra::DMatrix;
 use contact_geom::switching::BreakRate;
 use contact_geom::{Arguments, Hints, ScalarSystem, Slopes, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
-use discrete_herglotz::sensitivity::Variable;
+use discrete_herglotz::sensitivity::DifferentiableProblem;
 use discrete_herglotz::{
     AnyIntegrator, AtSwitch, Components, ExplicitDerivatives, ForceDerivatives, ForceKind, GaussCollocation,
     InputError, Kernels, Point, Quantity, ResumeState, Run, SecondDerivatives, State, System, SystemProblem, Until,
@@ -28,7 +28,7 @@ use std::sync::Arc;
 pub(super) struct ManyCoordinates(Arc<FormulaDerivatives>);
 
 /// What a formula with many coordinates has no kernel for.
-fn few(what: &'static str) -> RuntimeError {
+pub(super) fn few(what: &'static str) -> RuntimeError {
     RuntimeError::OfFewCoordinates { what, most: super::MOST_COMPILED_COORDINATES }
 }
 
@@ -198,6 +198,9 @@ impl ManyCoordinates {
         problem: &'p SystemProblem<'p>,
         motion: &Motion,
     ) -> Result<Run<'p, 'o>, RuntimeError> {
+        if motion.method.is_some() {
+            return Err(few("methods of one's own"));
+        }
         let run = match motion.step_control {
             StepControl::Accuracy { error, by: None } => problem.accuracy(error),
             StepControl::Accuracy { error, by: Some(by) } => problem.by(gauss(by)?).accuracy(error),
@@ -283,13 +286,13 @@ impl Kernel for ManyCoordinates {
     fn sensitivity(
         &self,
         motion: &Motion,
-        variables: &[Variable],
-        times: &[f64],
+        of: Differentiated<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
-        let until = Until::Time(motion.end);
+        let (until, problem) = (Until::Time(motion.end), self.problem(motion)?);
         self.observed(&unobserved(motion), monitor, |run| {
-            Ok(sensitivity_of(&run.tangent_at(variables, times, until)?, self.dimension()))
+            let found = run.tangent_at(of.variables, &of.row_times(motion), until)?;
+            of.of(&found, motion, (self, &problem.differentiable()))
         })
     }
 

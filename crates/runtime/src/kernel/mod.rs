@@ -2,14 +2,17 @@
 
 mod check;
 mod constrained;
+mod discrete;
 mod ensemble;
 mod ensemble_many;
 mod ensemble_of;
+mod event_times;
 mod formula_system;
 mod geometry;
 mod hamiltonian;
 mod many;
 mod member_derivatives;
+mod moved_start;
 mod observed;
 pub(crate) mod path;
 mod recorder;
@@ -27,6 +30,7 @@ pub(crate) use constrained::refuse_constraints;
 use contact_geom::{HamiltonianStructure, Lagrangian, Structure, Symmetry};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
 use discrete_herglotz::{AnyIntegrator, InputError, Integrator, ResumeState, ensemble::Tally, sensitivity::Variable};
+pub(crate) use event_times::{Differentiated, of_expression};
 use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use formula_system::FormulaSystem;
 pub(crate) use run::LOSSES_WITH_FORCE;
@@ -73,8 +77,7 @@ pub(crate) trait Kernel: Send + Sync {
     fn sensitivity(
         &self,
         _motion: &Motion,
-        _variables: &[Variable],
-        _times: &[f64],
+        _of: Differentiated<'_>,
         _monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
         Err(self.lacks(DERIVATIVES))
@@ -223,12 +226,10 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
     fn sensitivity(
         &self,
         motion: &Motion,
-        variables: &[Variable],
-        times: &[f64],
+        of: Differentiated<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
-        refuse_constraints(self.formula(), DERIVATIVES)?;
-        sensitivity::tangent(self, motion, variables, times, monitor)
+        sensitivity::tangent(self, motion, of, monitor)
     }
 
     fn gradient(
@@ -238,7 +239,6 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
-        refuse_constraints(self.formula(), DERIVATIVES)?;
         sensitivity::gradient(self, motion, times, loss, monitor)
     }
 
@@ -258,7 +258,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         loss: &BatchLoss<'_>,
         interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
-        refuse_constraints(self.formula(), DERIVATIVES)?;
+        refuse_constraints(self.formula(), "derivatives of ensembles")?;
         member_derivatives::gradients(self, ensemble, times, loss, interrupt)
     }
 
@@ -269,7 +269,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         times: &[f64],
         interrupt: Option<&Interrupt>,
     ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
-        refuse_constraints(self.formula(), DERIVATIVES)?;
+        refuse_constraints(self.formula(), "derivatives of ensembles")?;
         member_derivatives::sensitivities(self, ensemble, variables, times, interrupt)
     }
 }

@@ -19,6 +19,9 @@ use std::rc::Rc;
 /// The number of steps between two polls: a poll is then inexpensive compared with the steps.
 const STEPS_BETWEEN_POLLS: usize = 256;
 
+/// The round-off of the times of a run, relative to the largest of them.
+const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+
 /// Observes a motion on behalf of a [`RunMonitor`].
 pub(super) struct Recorder<'r> {
     rows: Option<Rows<'r>>,
@@ -30,6 +33,8 @@ pub(super) struct Recorder<'r> {
     /// Whether there are no rows between the start and the end of the motion.
     rows_at_ends: bool,
     needs: OutputRequest,
+    /// The time after which nothing is wanted of the motion.
+    until: Option<f64>,
     run_info: Option<RunInfo>,
     dimension: usize,
     lagrangian: &'r dyn Observed,
@@ -61,11 +66,24 @@ impl<'r> Recorder<'r> {
                 Some(OutputTimes::At(times)) => times.iter().all(|t| *t == motion.start.t || *t == motion.end),
             },
             needs: of_rows.and(of_all),
+            until: None,
             run_info: None,
             dimension: lagrangian.formula().dimension(),
             lagrangian,
             monitor,
         })
+    }
+
+    /// Ends the motion after the step that goes beyond a time.
+    pub fn until(self, t: Option<f64>) -> Self {
+        Recorder { until: t, ..self }
+    }
+
+    /// Whether nothing is wanted of the motion after a time. What happens at the end of a step may be in the next one.
+    fn is_over(&self, t: f64) -> bool {
+        let (Some(until), Some(RunInfo { t0, t_end, .. })) = (self.until, self.run_info) else { return false };
+        let beyond = if t_end < t0 { until - t } else { t - until };
+        beyond > ROUND_OFF * t0.abs().max(t_end.abs())
     }
 
     /// Passes on the rows, up to a time if one is given.
@@ -443,6 +461,11 @@ impl Observer for Recorder<'_> {
             }
         }
         self.pass_on_rows(None)?;
-        self.notify(at)
+        self.notify(at)?;
+        if !at.last && self.is_over(at.t) {
+            ControlFlow::Break(Stop::here("the last row"))
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Runs of one motion.
 
+use super::discrete;
 use super::formula_system::FormulaSystem;
 use super::recorder::Recorder;
 use super::sized::{Sized, coordinates};
@@ -31,6 +32,14 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
         StepControl::Accuracy { by, .. } => by,
         StepControl::Steps { by, .. } => Some(by),
     };
+    if let Some(method) = &motion.method {
+        let by = discrete::custom::<L, N>(method, &system.0)?;
+        let run = match motion.step_control {
+            StepControl::Accuracy { error, .. } => problem.by(by).accuracy(error),
+            StepControl::Steps { steps, .. } => problem.by(by).steps(steps),
+        };
+        return scaled(system, run, motion);
+    }
     let run = match (motion.step_control, system.0.constrained(by)?) {
         (StepControl::Accuracy { error, .. }, Some(method)) => problem.by(method).accuracy(error),
         (StepControl::Steps { steps, .. }, Some(method)) => problem.by(method).steps(steps),
@@ -38,6 +47,15 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
         (StepControl::Accuracy { error, by: Some(by) }, None) => problem.by(L::by(by)?).accuracy(error),
         (StepControl::Steps { by, steps }, None) => problem.by(L::by(by)?).steps(steps),
     };
+    scaled(system, run, motion)
+}
+
+/// A run with what a motion requests of it, and with its scales.
+fn scaled<'p, 'o, L: FormulaSystem<N>, const N: usize>(
+    system: &Sized<L, N>,
+    run: Run<'p, 'o, Problem<'p, L, N>>,
+    motion: &Motion,
+) -> Result<Run<'p, 'o, Problem<'p, L, N>>, RuntimeError> {
     let scales = motion.scales.as_ref().map(|scales| system.vector("scales", scales)).transpose()?;
     // Additional coordinates are at rest, and any size will do.
     let n = system.0.formula().dimension();

@@ -1,6 +1,8 @@
 //! Derivatives of motions.
 
+use super::event_times::Differentiated;
 use super::formula_system::FormulaSystem;
+use super::moved_start::{self, MovedStart};
 use super::recorder::Recorder;
 use super::run;
 use super::sized::{Sized, coordinates};
@@ -9,12 +11,13 @@ use crate::{
     Sensitivity, StateDerivative,
 };
 use contact_geom::{Parametric, Structure};
-use discrete_herglotz::sensitivity::{Tangent, Variable};
+use discrete_herglotz::sensitivity::{DifferentiableProblem, Tangent};
 use discrete_herglotz::{Until, Vector};
 
-/// The motion without rows and events, which its derivatives do not need.
+/// The motion without rows and without the events that do not end it, which its derivatives do not need.
 pub(super) fn unobserved(motion: &Motion) -> Motion {
-    Motion { rows: None, columns: Vec::new(), events: Vec::new(), estimate: false, nodes: false, ..motion.clone() }
+    let events = motion.events.iter().filter(|event| event.terminal).cloned().collect();
+    Motion { rows: None, columns: Vec::new(), events, estimate: false, nodes: false, ..motion.clone() }
 }
 
 /// The first n components of a vector.
@@ -32,7 +35,7 @@ pub(super) fn state(of: &MotionState, n: usize) -> MotionState {
     MotionState { t: of.t, q: first(&of.q, n), v: first(&of.v, n), p: first(&of.p, n), z: of.z }
 }
 
-fn derivative(of: &StateDerivative, n: usize) -> StateDerivative {
+pub(super) fn derivative(of: &StateDerivative, n: usize) -> StateDerivative {
     StateDerivative { q: first(&of.q, n), v: first(&of.v, n), p: first(&of.p, n), z: of.z }
 }
 
@@ -54,6 +57,7 @@ pub(super) fn sensitivity_of(found: &Tangent, n: usize) -> Sensitivity {
         unresolved: found.outcome.unresolved,
         states: found.rows.iter().map(|row| state(&row.state, n)).collect(),
         rows: found.rows.iter().map(|row| row.columns.iter().map(|column| derivative(column, n)).collect()).collect(),
+        event_times: Vec::new(),
         growth: found.growth,
     }
 }
@@ -61,16 +65,25 @@ pub(super) fn sensitivity_of(found: &Tangent, n: usize) -> Sensitivity {
 pub(super) fn tangent<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
     system: &Sized<L, N>,
     motion: &Motion,
-    variables: &[Variable],
-    times: &[f64],
+    of: Differentiated<'_>,
     monitor: &mut dyn RunMonitor,
 ) -> Result<Sensitivity, RuntimeError> {
+    let requested = motion;
     let motion = &unobserved(motion);
-    let (problem, n) = (system.problem_of(motion)?, system.0.formula().dimension());
-    let mut recorder = Recorder::new(&system.0, motion, monitor)?;
+    let problem = system.problem_of(motion)?;
+    moved_start::check(motion)?;
+    let (moved, times) = (MovedStart::of(system, motion)?, of.row_times(motion));
+    let mut recorder = Recorder::new(&system.0, motion, monitor)?.until(times.last().copied());
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
-    let found = run.tangent_at(variables, times, Until::Time(motion.end))?;
-    Ok(sensitivity_of(&found, n))
+    let until = Until::Time(motion.end);
+    let found = match &moved {
+        None => run.tangent_at(of.variables, &times, until)?,
+        Some(start) => {
+            let found = run.tangent_at(&start.variables(of.variables), &times, until)?;
+            start.push(found, of.variables, &system.0.parameter_names())
+        }
+    };
+    of.of(&found, requested, (&system.0, &problem.differentiable()))
 }
 
 pub(super) fn lyapunov_exponents<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
@@ -115,7 +128,9 @@ pub(super) fn gradient<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
     loss: &mut Loss<'_>,
     monitor: &mut dyn RunMonitor,
 ) -> Result<LossGradient, RuntimeError> {
+    moved_start::check(motion)?;
     let motion = &unobserved(motion);
+    let moved = MovedStart::of(system, motion)?;
     let (problem, n) = (system.problem_of(motion)?, system.0.formula().dimension());
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
@@ -125,5 +140,9 @@ pub(super) fn gradient<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
         (value, covectors.iter().map(|of| covector(of, n, N)).collect())
     };
     let found = run.gradient_at(times, of_states, Until::Time(motion.end))?;
-    Ok(loss_gradient(found, n))
+    let mut found = loss_gradient(found, n);
+    if let Some(start) = &moved {
+        found.loss = found.loss.map(|(value, gradient)| (value, start.pull(gradient)));
+    }
+    Ok(found)
 }

@@ -1,11 +1,12 @@
 //! Derivatives of the motions of a system.
 
+use crate::kernel::{Differentiated, of_expression};
 use crate::{
-    EndCovector, Event, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError,
-    Sensitivity, System, velocity_name,
+    Event, EventAt, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError, Sensitivity,
+    System, velocity_name,
 };
 use discrete_herglotz::sensitivity::Variable;
-use formula_lagrangian::{Expression, ExpressionGradient, nearest_name};
+use formula_lagrangian::{Expression, nearest_name};
 
 impl System {
     /// Runs a motion, and differentiates its states at some times, which are in the order of the motion, with respect to
@@ -35,9 +36,49 @@ impl System {
         times: &[f64],
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
-        let variables = variables.iter().map(|name| self.variable(name)).collect::<Result<Vec<_>, _>>()?;
-        check_events(&motion.events)?;
-        self.kernel.sensitivity(motion, &variables, times, monitor)
+        self.sensitivity_with_events(motion, variables, times, &[], monitor)
+    }
+
+    /// The same with the derivatives of the times of sign changes of events, which a [run](Self::run) of the motion has
+    /// found, [resets](Event::reset) among them. Where a terminal event is one of them, the row at its time moves with it:
+    /// its derivatives are those of the end of the motion.
+    ///
+    /// ```
+    /// use herglotz_runtime::{Crossing, Event, EventAt, Motion, RunMonitor, Start, StepControl, System};
+    /// struct Keep(Vec<EventAt>);
+    /// impl RunMonitor for Keep {
+    ///     fn crossing(&mut self, crossing: &Crossing) -> std::ops::ControlFlow<()> {
+    ///         self.0.push(EventAt { event: crossing.event, t: crossing.t });
+    ///         std::ops::ControlFlow::Continue(())
+    ///     }
+    /// }
+    /// let fall = System::parse("x'^2/2 - g*x", &["x"], &[("g", 2.0)])?;
+    /// let ground = Event { terminal: true, ..Event::new(fall.formula().expression("x")?) };
+    /// let motion = Motion {
+    ///     events: vec![ground],
+    ///     ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, StepControl::Accuracy { error: 1e-10, by: None })
+    /// };
+    /// let mut found = Keep(Vec::new());
+    /// fall.run(&motion, &mut found)?;
+    /// // The time of the fall is sqrt(2 x / g).
+    /// let slopes = fall.sensitivity_with_events(&motion, &["g", "x"], &[], &found.0, &mut ())?;
+    /// assert!((slopes.event_times[0][0] + 0.25).abs() < 1e-9 && (slopes.event_times[0][1] - 0.5).abs() < 1e-9);
+    /// # Ok::<(), herglotz_runtime::RuntimeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`sensitivity`](Self::sensitivity); [`RuntimeError::Argument`] for sign changes that the motion does not
+    /// have, [`RuntimeError::Sensitivity`] for tangential ones.
+    pub fn sensitivity_with_events(
+        &self,
+        motion: &Motion,
+        variables: &[&str],
+        times: &[f64],
+        crossings: &[EventAt],
+        monitor: &mut dyn RunMonitor,
+    ) -> Result<Sensitivity, RuntimeError> {
+        let variables = &variables.iter().map(|name| self.variable(name)).collect::<Result<Vec<_>, _>>()?;
+        self.kernel.sensitivity(motion, Differentiated { variables, times, crossings }, monitor)
     }
 
     /// Runs a motion, and computes the value and the gradient of a loss of its states at some times, by the adjoint of
@@ -173,13 +214,4 @@ pub(super) fn check_events(events: &[Event]) -> Result<(), RuntimeError> {
         return Err(RuntimeError::argument("motion", why));
     }
     Ok(())
-}
-
-/// The value of an expression of a state, its partial derivatives in the state, and those in the parameters.
-pub(super) fn of_expression(loss: &Expression, end: &MotionState) -> (f64, EndCovector, Vec<f64>) {
-    let ExpressionGradient { value, t, q, v, z, parameters, .. } = loss.gradient_at(end.t, &end.q, &end.v, end.z);
-    let zero = EndCovector::zero(end.q.len());
-    // An expression of a conformal factor has no value here; it is reported as a loss that is not finite.
-    let covector = if value.is_nan() { zero } else { EndCovector { t, q: q.into(), v: v.into(), z, ..zero } };
-    (value, covector, parameters)
 }

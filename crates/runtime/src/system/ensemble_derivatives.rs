@@ -1,6 +1,7 @@
 //! Derivatives of the members of an ensemble of a system.
 
-use super::derivatives::{check_events, of_expression};
+use super::derivatives::check_events;
+use crate::kernel::of_expression;
 use crate::{BatchLoss, Ensemble, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, System};
 use formula_lagrangian::Expression;
 use std::sync::{Mutex, PoisonError};

@@ -298,7 +298,7 @@ fn fit(problem: &Problem, system: &System, name: &str, times: &[f64]) -> Result<
     }
     let started = problem.with(name, guess);
     let values = truth.rows.iter().map(|row| row[0]).collect();
-    let data = Series { quantity: "x".into(), times: times.to_vec(), values, deviations: None };
+    let data = Series { quantity: "x".into(), times: times.to_vec(), values, deviations: None, event: None };
     let request = MotionFit::new(started.motion(system), [Unknown::free(name)], [data]);
     let started = refused(system.with_parameters(&[(name, guess)]))?;
     let fitted = refused(started.fit(&request, &mut ()))?;

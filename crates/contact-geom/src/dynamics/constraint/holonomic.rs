@@ -32,6 +32,12 @@ pub trait Constraint<const N: usize, const M: usize> {
     fn count(&self) -> usize {
         M
     }
+
+    /// The derivatives in a parameter, the one with this index among those of the Lagrangian, of the values `c(q)` and of
+    /// their Jacobian `c_q`; `None`, the default, where the constraints do not contain it.
+    fn in_parameter(&self, _parameter: usize, _q: &SVector<f64, N>) -> Option<(SVector<f64, M>, SMatrix<f64, M, N>)> {
+        None
+    }
 }
 
 impl<const N: usize, const M: usize, C: Constraint<N, M>> Constraint<N, M> for &C {
@@ -41,6 +47,10 @@ impl<const N: usize, const M: usize, C: Constraint<N, M>> Constraint<N, M> for &
 
     fn count(&self) -> usize {
         (**self).count()
+    }
+
+    fn in_parameter(&self, parameter: usize, q: &SVector<f64, N>) -> Option<(SVector<f64, M>, SMatrix<f64, M, N>)> {
+        (**self).in_parameter(parameter, q)
     }
 }
 

@@ -23,8 +23,9 @@ impl DiscreteSteps<'_> {
     fn sources(&self, step: &StepEnds, of: &mut dyn Quantities) -> Result<Vec<Components>, StepError> {
         let StepEnds { t, h, start, end } = step;
         let system = &self.problem.system;
-        let along = |variation: &mut dyn FnMut(f64, &Point) -> (f64, Components)| {
-            let source = self.integrator.step_variation(&self.problem, *h, (*t, start, end), variation)?;
+        let along = |parameter, variation: &mut dyn FnMut(f64, &Point) -> (f64, Components)| {
+            let step = (*t, start, end);
+            let source = self.integrator.step_variation(&self.problem, *h, step, parameter, variation)?;
             source.ok_or(StepError::NonFinite)
         };
         // The value with the gradient, which contains the force.
@@ -35,10 +36,11 @@ impl DiscreteSteps<'_> {
         };
         let mut sources = Vec::with_capacity(of.count() + 2);
         for quantity in (0..of.count()).map(Quantity::Parameter).chain([Quantity::Time]) {
-            sources.push(along(&mut |s, x| varied(of, quantity, s, x))?);
+            let parameter = if let Quantity::Parameter(k) = quantity { Some(k) } else { None };
+            sources.push(along(parameter, &mut |s, x| varied(of, quantity, s, x))?);
         }
         // In the length: see `Integrator::step_variation`.
-        let of_length = along(&mut |s, x| {
+        let of_length = along(None, &mut |s, x| {
             let (l, mut slope) = (system.value(s, x), system.gradient(s, x));
             if system.hints().forced {
                 slope.x += system.applied_force(s, x);
