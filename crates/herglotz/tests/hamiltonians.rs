@@ -2,8 +2,8 @@
 
 use herglotz::Scene;
 use herglotz::runtime::{
-    AnyIntegrator, Column, Ensemble, Event, Formula, FormulaNames, InitialVelocity, InputError, MemberEnd, Motion,
-    OutputTimes, RuntimeError, Start, Status, StepControl, Steps, System, Varied,
+    AnyIntegrator, BoundaryProblem, Column, Ensemble, Event, Formula, FormulaNames, InitialVelocity, InputError,
+    MemberEnd, Motion, OutputTimes, RuntimeError, Start, Status, StepControl, Steps, System, Varied,
 };
 use std::ops::ControlFlow;
 
@@ -183,8 +183,11 @@ fn what_a_hamiltonian_cannot_do_is_refused() -> Result {
     assert!(of_velocities.is_err());
     let many = Formula::parse_hamiltonian("p[0]*q[4]", &FormulaNames::new(&["x[5]"], &[]))?;
     assert!(matches!(System::new(&many), Err(RuntimeError::HamiltonianDimension { found: 5, most: 4 })));
-    let derivatives = h.lyapunov_exponents(&motion(at(&[2.0], &[1.0], 0.0), gauss(4)), &mut ());
-    assert!(matches!(derivatives, Err(RuntimeError::OfLagrangians { .. })));
+    let path = h.path(&BoundaryProblem::new([vec![2.0], vec![3.0]], (0.0, 1.0), "gauss_2".parse()?, 10));
+    assert!(matches!(path, Err(RuntimeError::OfLagrangians { .. })));
+    // The exponents of (q, p, z) are those of the discrete motion, whose sum is two times the rate, 0.
+    let exponents = h.lyapunov_exponents(&motion(at(&[2.0], &[1.0], 0.0), gauss(4)), &mut ())?;
+    assert!(exponents.volume_defect.is_some_and(|defect| defect < 1e-12), "{exponents:?}");
     Ok(())
 }
 

@@ -112,8 +112,8 @@ pub enum RuntimeError {
     },
     /// Something that is not computed under constraints was requested of a formula with constraints.
     #[error(
-        "{what} are not computed with constraints; motions, their rows, events, plans and checkpoints, and ensembles \
-         are. Choose coordinates in which the constraints are solved"
+        "{what} are not computed with constraints; motions, their rows, events, plans, checkpoints, derivatives and fits, \
+         and ensembles are. Choose coordinates in which the constraints are solved"
     )]
     WithConstraints {
         /// What was requested.

@@ -28,8 +28,9 @@ pub enum ConstrainedMethod {
 ///
 /// The start of the problem satisfies the constraints: [`ConstrainedStart::resolved`] projects one that does not. An
 /// accuracy is met by runs with steps that are halved until they agree, since collocation, the reference for other
-/// integrators, knows no constraints. The derivative of the motion in its start holds along vectors that are tangent to
-/// the constraints; those in parameters, in the time and in the step size hold for a start that satisfies them.
+/// integrators, knows no constraints. Derivatives of a run are those of a start that stays on the constraints: it moves along
+/// `W^-1 G^T` where they contain a parameter ([`Constraint::in_parameter`]), and in the direction of a variable of the start
+/// it is projected to them ([`StartProjection`]).
 ///
 /// ```
 /// use contact_examples::systems::constrained::RigidPendulum;
