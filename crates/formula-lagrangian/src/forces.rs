@@ -25,6 +25,14 @@ impl Forces {
         true
     }
 
+    /// Adds a force on a coordinate to what it has.
+    pub fn add(&mut self, i: u32, force: Id, dimension: usize, graph: &mut Graph) {
+        self.components.resize(dimension, None);
+        if let Some(component) = self.components.get_mut(i as usize) {
+            *component = Some(component.map_or(force, |known| graph.add(known, force)));
+        }
+    }
+
     /// The nodes that are given.
     pub fn roots(&self) -> impl Iterator<Item = Id> {
         self.components.iter().copied().chain([self.rayleigh]).flatten()

@@ -1,6 +1,7 @@
 //! Formulas: an expression graph with the names of its coordinates and parameters.
 
 use crate::forces::Forces;
+use crate::friction::Mode;
 use crate::names::Names;
 use crate::node::Inputs;
 use crate::resets::FormulaReset;
@@ -34,6 +35,8 @@ pub struct Formula {
     pub(crate) constraints: Vec<Id>,
     /// Their texts, empty for those that were given as nodes.
     pub(crate) constraint_texts: Vec<String>,
+    /// The modes of coordinates with friction, which are the last coordinates.
+    pub(crate) modes: Vec<Mode>,
 }
 
 impl Formula {
@@ -47,6 +50,7 @@ impl Formula {
             breaks: Vec::new(),
             resets: Vec::new(),
             constraints: Vec::new(),
+            modes: Vec::new(),
             constraint_texts: Vec::new(),
         }
     }

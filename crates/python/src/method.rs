@@ -39,7 +39,6 @@ impl Method {
 
 /// The Lagrangian of a system at traced values: t, q, v, z and the parameters, of which `beside` is any traced value.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "they are the inputs of a Lagrangian")]
 pub fn lagrangian_at(
     system: &System,
     beside: &Symbol,

@@ -132,11 +132,11 @@ impl Motion {
             InitialVelocity::Velocity(v) => ("v0", v.len()),
             InitialVelocity::Momentum(p) | InitialVelocity::MomentumNear { p, .. } => ("p0", p.len()),
         };
-        let expected = formula.dimension();
+        let (expected, given) = (formula.dimension(), formula.given_dimension());
         for (what, found) in [("q0", q.len()), length] {
-            if found != expected {
+            if found != expected && found != given {
                 return Err(value_error(format!(
-                    "`{what}` has {found} numbers, but the system has {expected} coordinates"
+                    "`{what}` has {found} numbers, but the system has {given} coordinates"
                 )));
             }
         }

@@ -3,6 +3,7 @@
 use crate::arrays::{of_formula, value_error};
 use crate::table::Table;
 use contact_geom::table::Table as Samples;
+use formula_lagrangian::Friction;
 use herglotz_runtime::{Formula, FormulaError, FormulaNames, FormulaSymmetry};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
@@ -36,7 +37,13 @@ struct Additions {
     breaks: Vec<f64>,
     /// The holonomic constraints.
     constraints: Vec<String>,
+    /// The friction on coordinates: its size while they slide, the largest one while they stick, and the velocity of the
+    /// surface.
+    friction: Vec<GivenFriction>,
 }
+
+/// A coordinate with its friction.
+type GivenFriction = (String, String, Option<String>, Option<String>);
 
 /// Whether the formula is a Hamiltonian, the names of its momenta as they were given, and the name of the action.
 #[derive(Clone)]
@@ -83,6 +90,12 @@ impl Additions {
             let with = formula.with_constraints(&[text.as_str()]);
             formula = with.map_err(|error| value_error(format!("the constraint {text:?}: {}", of_formula(error))))?;
         }
+        for (coordinate, sliding, sticking, surface) in &self.friction {
+            let friction = Friction { sliding, sticking: sticking.as_deref(), surface: surface.as_deref() };
+            let with = formula.with_friction(coordinate, friction);
+            formula =
+                with.map_err(|error| value_error(format!("the friction on {coordinate:?}: {}", of_formula(error))))?;
+        }
         formula.with_breaks(&self.breaks).map_err(value_error)
     }
 }
@@ -100,6 +113,7 @@ type Arguments<'py> = (
     Vec<String>,
     Vec<f64>,
     Vec<String>,
+    Vec<GivenFriction>,
     GivenKind,
 );
 
@@ -127,7 +141,8 @@ pub fn values(of: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<(String, f64)>> {
 impl System {
     #[new]
     #[pyo3(signature = (lagrangian, coordinates, parameters = None, tables = Vec::new(), forces = Vec::new(),
-                        rayleigh = Vec::new(), breaks = Vec::new(), constraints = Vec::new(), kind = None))]
+                        rayleigh = Vec::new(), breaks = Vec::new(), constraints = Vec::new(),
+                        friction = Vec::new(), kind = None))]
     #[expect(clippy::too_many_arguments, reason = "they are those of `system`, which names them")]
     fn new(
         lagrangian: String,
@@ -138,6 +153,7 @@ impl System {
         rayleigh: Vec<String>,
         breaks: Vec<f64>,
         constraints: Vec<String>,
+        friction: Vec<GivenFriction>,
         kind: Option<GivenKind>,
     ) -> PyResult<Self> {
         let (hamiltonian, momenta, action) = kind.unwrap_or_else(|| (false, Vec::new(), "z".to_owned()));
@@ -145,7 +161,7 @@ impl System {
         let parameters = values(parameters)?;
         let values: Vec<(&str, f64)> = parameters.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         let tables = tables.into_iter().map(|(name, table)| (name, table.get().inner.clone())).collect();
-        let additions = Additions { tables, forces, rayleigh, breaks, constraints };
+        let additions = Additions { tables, forces, rayleigh, breaks, constraints, friction };
         let formula = additions.formula(&kind, &lagrangian, &texts(&coordinates), &values)?;
         let inner = herglotz_runtime::System::new(&formula).map_err(value_error)?;
         Ok(System { inner, formula, additions, kind, lagrangian, given_coordinates: coordinates })
@@ -179,6 +195,13 @@ impl System {
     #[getter]
     fn constraints(&self) -> Vec<String> {
         self.additions.constraints.clone()
+    }
+
+    /// The friction on coordinates: its size while they slide, the largest one while they stick, and the velocity of the
+    /// surface.
+    #[getter]
+    fn friction(&self) -> Vec<GivenFriction> {
+        self.additions.friction.clone()
     }
 
     /// What contact flows have and the motions of this system lose because of its forces, each with the reason.
@@ -222,11 +245,12 @@ impl System {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (this, py) = (slf.get(), slf.py());
-        let Additions { forces, rayleigh, breaks, constraints, .. } = this.additions.clone();
+        let Additions { forces, rayleigh, breaks, constraints, friction, .. } = this.additions.clone();
         let (text, coordinates) = (this.lagrangian.clone(), this.given_coordinates.clone());
         let tables = this.tables();
         let parameters = this.parameters(py)?;
-        let arguments = (text, coordinates, parameters, tables, forces, rayleigh, breaks, constraints, this.kind());
+        let arguments =
+            (text, coordinates, parameters, tables, forces, rayleigh, breaks, constraints, friction, this.kind());
         Ok((slf.get_type(), arguments))
     }
 
@@ -234,7 +258,7 @@ impl System {
         let parameters = self.inner.formula().parameters().map(|(name, value)| format!("{name:?}: {value:?}"));
         let parameters: Vec<String> = parameters.collect();
         let (l, coordinates) = (&self.lagrangian, &self.given_coordinates);
-        let Additions { tables, forces, rayleigh, breaks, constraints } = &self.additions;
+        let Additions { tables, forces, rayleigh, breaks, constraints, friction } = &self.additions;
         let mut text = format!("System({l:?}, {coordinates:?}, {{{}}}", parameters.join(", "));
         if !tables.is_empty() {
             text += &format!(", tables={:?}", tables.iter().map(|(name, _)| name).collect::<Vec<_>>());
@@ -250,6 +274,9 @@ impl System {
         }
         if !constraints.is_empty() {
             text += &format!(", constraints={constraints:?}");
+        }
+        if !friction.is_empty() {
+            text += &format!(", friction={friction:?}");
         }
         if self.kind.hamiltonian || self.kind.action != "z" {
             text += &format!(", kind={:?}", self.kind());

@@ -75,6 +75,7 @@ ROWS = dict(
     momenta=Refused(["p"], "unknown name `p_x`", HAMILTONIAN),
     action=Refused("s", "unknown name `z`"),
     constraints=Changed("x^2 + y^2 = 1", PENDULUM),
+    friction={"x": 0.2},
     project=Refused(True, "the system has no constraints"),
 )
 WATCH = dict(
@@ -215,6 +216,7 @@ CASES = {
             n=Refused(2, "`n` is 2, but the system has 1 coordinates"),
             breaks=[0.5],
             constraints=Changed("x = y", dict(coordinates=["x", "y"])),
+            friction={"x": 0.2},
         ),
     ),
     "table": (hz.table, dict(t=[0.0, 1.0, 2.0], y=[0.0, 1.0, 0.0]), dict(t=[0.0, 1.5, 2.0], y=[0.0, 2.0, 0.0], pieces="cubic")),
@@ -303,7 +305,7 @@ CASES = {
         dict(lagrangian="x'^2/2", coordinates=["x"]),
         dict(
             lagrangian="x'^2", coordinates=["x", "y"], parameters={"k": 1.0}, tables=[("drive", DRIVE)], forces=[("x", "-x'")],
-            rayleigh=["x'^2"], breaks=[1.0], constraints=Changed(["x = y"], dict(coordinates=["x", "y"])), kind=Refused((True, [], "z"), "write `p_x`"),
+            rayleigh=["x'^2"], breaks=[1.0], constraints=Changed(["x = y"], dict(coordinates=["x", "y"])), friction=[("x", "1", None, None)], kind=Refused((True, [], "z"), "write `p_x`"),
         ),
     ),
     "Table": (hz.Table, dict(t=[0.0, 1.0, 2.0], y=[0.0, 1.0, 0.0]), dict(t=[0.0, 1.5, 2.0], y=[0.0, 2.0, 0.0], pieces="cubic")),
@@ -321,6 +323,7 @@ DIFFERENTIABLE = dict(GIVEN, t=[0.0, 0.4, 1.0])
 OF_DIFFERENTIABLE = SOLVE | NO_ROWS | dict(
     z0=Changed(0.7, dict(L="x'^2/2 - x^2/2 - z^2/10", parameters=None)),
     H=Refused("p_x^2/2", "`H` cannot be given here"),
+    friction=Refused({"x": 0.2}, "`friction` cannot be given here"),
     p0=Refused([1.0], "`p0` cannot be given here"),
     momenta=Refused(["p"], "`momenta` cannot be given here"),
     events=Changed(BALL, RESET | dict(t=[0.0, 1.0, 3.0])),

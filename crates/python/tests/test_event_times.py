@@ -93,16 +93,16 @@ def test_the_mean_of_a_thermostat():
 
 def test_the_nutation_of_a_heavy_top_in_its_inertia():
     top = lambda i3: hz.rigid_body(  # noqa: E731
-        (0.234375, 0.46875, i3), mass=15.0, centre=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), omega=(0.0, 150.0, -4.61538), t=0.5,
+        (0.3, 0.46875, i3), mass=15.0, centre=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), omega=(0.0, 150.0, -4.61538), t=0.5,
         integrator="gauss_4", steps=400, sensitivity=True,
     )  # fmt: skip
     d = 1e-5
-    slopes = top(0.234375).derivatives.in_parameters["inertia3"]
-    after, before = top(0.234375 + d), top(0.234375 - d)
+    slopes = top(0.25).derivatives.in_parameters["inertia33"]
+    after, before = top(0.25 + d), top(0.25 - d)
     # The first three numbers of a derivative are a rotation in the body: the tip moves by its product with the centre.
     turn = np.cross(slopes[:3], [0.0, 1.0, 0.0])
     expected = (after.tip[-1] - before.tip[-1]) / (2 * d)
-    matrix = rotation(top(0.234375).attitude[-1])
+    matrix = rotation(top(0.25).attitude[-1])
     assert np.allclose(matrix @ turn, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
 
 
@@ -118,7 +118,7 @@ def rotation(quaternion):
 
 
 def test_a_fit_to_times_of_bounces():
-    times = ball(0.8, 9.81, 2.0).events[0].t
+    times = ball(0.8, 9.81, 1.4).events[0].t
     measured = times.copy()
     measured[1] = np.nan
     found = hz.fit(
@@ -146,11 +146,3 @@ def test_times_of_events_that_cannot_be_fitted(events, message):
         given |= dict(t=[0.0, 0.1], data={"x": [0.0, 0.1]})
     with pytest.raises(ValueError, match=message):
         hz.fit("x'^2/2 - g*x", [0.0], [2.0], **given)
-
-
-def test_a_tangential_event_has_no_derivative():
-    # x = 1 - cos(t) touches the level 2 at its turning point.
-    sol = hz.solve("x'^2/2 - (x - 1)^2/2", [0.0], [0.0], 3.0, coordinates=["x"], events=["x'"])
-    assert len(sol.events[0].t) in (0, 1)
-    with pytest.raises(ValueError, match="(?i)tangent|graz"):
-        hz.solve("x'^2/2", [1.0], [0.0], 1.0, coordinates=["x"], events=hz.Event("x'", "rising")).sensitivity("nothing")

@@ -84,7 +84,7 @@ CAPABILITIES = {
     "resets": lambda kind: kind.run(events=hz.Event("x", "falling", reset={"x'": "-x'/2"})).events,
     "backward": lambda kind: kind.run(t=[0.0, -0.5, -1.0]),
     "breaks": lambda kind: kind.run(breaks=[0.35]),
-    "plan": lambda kind: kind.run().plan.text,
+    "plan": lambda kind: str(kind.run().plan),
     "check": lambda kind: member(kind, hz.check, t=1.0, **kind.steps),
     "compare": lambda kind: member(kind, hz.compare, t=0.1),
     "resume": lambda kind: kind.run().resume(1.5),
@@ -110,7 +110,6 @@ OTHERWISE = {
     "L with force": {"own method": "without forces, constraints and resets"},
     "H": {
         "resets": "Hamiltonian",
-        "breaks": "Hamiltonian",
         "path": NONE,
         "own method": "takes no Hamiltonian",
         "fit": NONE,
@@ -120,7 +119,8 @@ OTHERWISE = {
         "ensemble": NONE,
     },
     "constraints": {
-        "resets": "constraints",
+        "resets": "combined with resets",
+        "breaks": "steps under constraints do not end on them",
         "check": NONE,
         "compare": NONE,
         "ensemble": NONE,
@@ -131,8 +131,9 @@ OTHERWISE = {
     "rigid body": {
         "states between rows": NONE,
         "resets": "x",
-        "terminal events": NONE,
         "breaks": NONE,
+        "plan": NONE,
+        "resume": NONE,
         "check": NONE,
         "compare": NONE,
         "adjoint": NONE,
@@ -149,7 +150,7 @@ OF_MANY = {
     name: NONE
     for name in CAPABILITIES
     if name
-    not in ("given steps", "rows at times", "backward", "plan", "resume", "progress and callback", "pandas", "xarray", "picture")
+    not in ("given steps", "rows at times", "backward", "resume", "progress and callback", "pandas", "xarray", "picture")
 }
 OTHERWISE |= {"lattice": OF_MANY, "bodies": OF_MANY}
 

@@ -86,7 +86,7 @@ def test_it_is_compared():
         (lambda: hz.solve(**GIVEN, t=1.0, force={"x": "-x'"}, integrator=hz.method(midpoint, 1), step=0.1), "without forces, constraints and resets"),
         (lambda: hz.solve(**GIVEN, t=1.0, integrator=hz.method(lambda L, t, q0, q1, z0, h: h * L(t, q0, q1), 1), step=0.1), "missing 1 required"),
         (lambda: hz.solve(**GIVEN, t=1.0, integrator=hz.method(lambda L, t, q0, q1, z0, h: h * L(t, q0, [1.0, 2.0], z0), 1), step=0.1), "2 numbers as v"),
-        (lambda: hz.solve(**GIVEN, t=1.0, integrator=hz.method(lambda L, t, q0, q1, z0, h: q0, 1, name="mine"), step=0.1), "singular|not|cannot"),
+        (lambda: hz.solve(**GIVEN, t=1.0, integrator=hz.method(lambda L, t, q0, q1, z0, h: q0[0], 1, name="mine"), step=0.1), "not regular"),
         (lambda: hz.ensemble(GIVEN["L"], [[1.0]], [[0.0]], 1.0, coordinates=["x"], parameters={"gamma": -0.1}, integrator=hz.method(midpoint, 1), step=0.1), "integrator"),
     ],
 )  # fmt: skip

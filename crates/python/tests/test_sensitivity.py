@@ -280,7 +280,7 @@ SAID = {
         "not implemented; choose a Gauss method such as \"gauss_8\"",
     ),
     "a terminal event": (
-        lambda: pendulum(10.0, events=hz.Event("x", terminal=True)).sensitivity("gamma"),
+        lambda: pendulum(10.0, events=hz.Event("x", terminal=True)).pullback(q=[1.0]),
         "terminal event.*fixed time",
     ),
     "a motion that fails": (

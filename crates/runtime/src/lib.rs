@@ -81,7 +81,7 @@ pub use discrete_herglotz::{
     AnyIntegrator, INTERRUPTION, InputError, MethodInfo, PlanEntry, ResumeState, SelectionFailure, Status, StepError,
     Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally, hamiltonian::ModifiedDefect,
 };
-pub use formula_lagrangian::{Direction as FormulaDirection, Reset as FormulaReset};
+pub use formula_lagrangian::{Direction as FormulaDirection, Friction, Reset as FormulaReset};
 pub use formula_lagrangian::{Expression, Formula, FormulaError, FormulaNames, Graph, ParseError};
 pub use formula_lagrangian::{Symbol, Symbols, nearest_name};
 pub use herglotz_fit::{Bound, Fit, FitError, FitStatus, Loss as ResidualLoss};

@@ -180,6 +180,7 @@ impl System {
     /// # Errors
     /// Errors that concern all members.
     pub fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
+        kernel::check_direction(self.formula(), ensemble.t0, ensemble.end)?;
         self.kernel.ensemble(ensemble, monitor)
     }
 

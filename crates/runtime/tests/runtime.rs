@@ -8,6 +8,7 @@ mod body;
 mod divided_steps;
 mod event_times;
 mod fit;
+mod friction;
 mod jump_times;
 mod lyapunov_of_impacts;
 mod motions;

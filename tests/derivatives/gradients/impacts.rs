@@ -8,7 +8,7 @@ use contact_geom::numbers::max_or_nan;
 use contact_geom::switching::{Impact, Impacts, Surface};
 use contact_geom::{Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{
-    EndCovector, EndState, Loss, MotionState, SensitivityError, TangentRow, Variable,
+    DifferentiableProblem, EndCovector, EndState, Loss, MotionState, SensitivityError, TangentRow, Variable,
 };
 use discrete_herglotz::{GaussCollocation, Problem, Status, Steps, Until};
 

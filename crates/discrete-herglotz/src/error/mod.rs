@@ -324,7 +324,8 @@ pub enum StepError {
     /// The Lagrangian switches too often within a step.
     #[error(
         "the Lagrangian switches too often near t = {t}: the motion slides along the surface of a kink or a jump, or \
-         crosses it at ever shorter intervals; smooth the kink, or end the run before this time"
+         crosses it at ever shorter intervals; smooth the kink, give dry friction that sticks as `friction`, or end the \
+         run before this time"
     )]
     Switching {
         /// The time that is reached.

@@ -40,6 +40,10 @@ pub(crate) struct File {
     /// not contact: the defect is the virtual work of the force.
     #[serde(default)]
     pub force: Option<Location<Named<String>>>,
+    /// Dry friction on coordinates, which sticks and slips by itself: `[friction.x]` is that on the coordinate `x`. The motion
+    /// has one coordinate more for each, `slip_x`: 0 while x sticks, 1 and -1 while it slips, the direction of the force.
+    #[serde(default)]
+    pub friction: Named<FrictionTable>,
     /// Functions of time by samples, with their names: the table `drive` is `drive(t)` in all formulas of the scene.
     #[serde(default)]
     pub tables: Named<SamplesTable>,
@@ -55,6 +59,25 @@ pub(crate) struct File {
     /// Data to which `herglotz fit` fits parameters and the initial state.
     #[serde(default)]
     pub fit: Option<Box<Location<FitTable>>>,
+}
+
+/// Dry friction on a coordinate.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, expecting = "a table with `sliding`, the size of the force while the coordinate slides")]
+pub(crate) struct FrictionTable {
+    /// The size of the force while the coordinate slides, as in `"mu*m*g"`.
+    pub sliding: Location<String>,
+    /// The largest force that holds it while it sticks; that of sliding by default.
+    pub sticking: Option<Location<String>>,
+    /// The velocity of the surface, a function of time; 0 by default.
+    pub surface: Option<Location<String>>,
+}
+
+impl FrictionTable {
+    /// Its formulas.
+    pub fn formulas(&self) -> impl Iterator<Item = &Location<String>> {
+        [&self.sliding].into_iter().chain(&self.sticking).chain(&self.surface)
+    }
 }
 
 /// The Lagrangian.

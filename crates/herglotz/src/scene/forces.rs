@@ -1,8 +1,9 @@
 //! The forces of a scene.
 
 use super::SceneError;
+use super::file::FrictionTable;
 use super::location::{Location, Named};
-use crate::runtime::{Formula, FormulaError};
+use crate::runtime::{Formula, FormulaError, Friction};
 
 /// The key of Rayleigh's dissipation function.
 const RAYLEIGH: &str = "rayleigh";
@@ -21,6 +22,20 @@ pub(super) fn with_forces(
             coordinate => formula.with_force(coordinate, force),
         };
         with.map_err(|error| of_assignment(text, (name, force), &error))
+    })
+}
+
+/// The formula with the friction of a table.
+pub(super) fn with_friction(text: &str, formula: Formula, table: &Named<FrictionTable>) -> Result<Formula, SceneError> {
+    table.0.iter().try_fold(formula, |formula, (name, of)| {
+        let part = |part: &Option<Location<String>>| part.as_ref().map(|text| (**text).clone());
+        let (sticking, surface) = (part(&of.sticking), part(&of.surface));
+        let friction = Friction { sliding: &of.sliding, sticking: sticking.as_deref(), surface: surface.as_deref() };
+        formula.with_friction(name, friction).map_err(|error| {
+            // The formula that cannot be read is the first one that is wrong by itself.
+            let wrong = of.formulas().find(|text| formula.expression(text).is_err()).unwrap_or(&of.sliding);
+            of_assignment(text, (name, wrong), &error)
+        })
     })
 }
 

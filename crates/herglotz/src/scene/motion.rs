@@ -4,7 +4,7 @@ use super::checked::{check_version, finite};
 use super::constraints::with_constraints;
 use super::file::{self, EventTable, File};
 use super::fit::{self, SceneFit};
-use super::forces::with_forces;
+use super::forces::{with_forces, with_friction};
 use super::location::{Location, Named, Span};
 use super::members::Members;
 use super::output::{self, EventColumns, Events, RowTimes, times_in_order};
@@ -137,6 +137,7 @@ impl Scene {
         let (system, run) = (&file.system, &file.run);
         let header = file.start.as_ref().map_or(system.span(), Location::span);
         let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
+        let formula = with_friction(text, formula, &file.friction)?;
         let end = finite(text, &run.time, "time")?;
         let breaks = run.breaks.as_deref().map(Vec::as_slice).unwrap_or_default();
         let breaks = times_in_order(text, breaks, "breaks", (start.t, end))?;
@@ -413,7 +414,8 @@ fn all_formulas(file: &File) -> Vec<&str> {
     let resets = file.want.events.iter().flat_map(|event| [&event.then, &event.rest]).flat_map(values);
     let fit = file.fit.iter().flat_map(|fit| fit.formulas());
     let others = expressions(file).map(String::as_str);
-    system.chain(values(&file.force)).chain(others).chain(resets).chain(fit).collect()
+    let friction = file.friction.0.iter().flat_map(|(_, of)| of.formulas()).map(|text| text.as_str());
+    system.chain(values(&file.force)).chain(friction).chain(others).chain(resets).chain(fit).collect()
 }
 
 /// Forces, constraints, tables, breaks and resets in one text.
@@ -433,5 +435,16 @@ fn additions(file: &File, tables: &[(Location<String>, Table)]) -> String {
     let constraints =
         if constraints.is_empty() { String::new() } else { format!(" {constraints:?} {}", file.run.project) };
     let exact = if file.run.exact { " exact" } else { "" };
-    format!("{:?} {} {breaks:?} {resets:?}{constraints}{exact}", pairs(&file.force), tables::fingerprint(tables))
+    let friction: Vec<String> = file
+        .friction
+        .0
+        .iter()
+        .map(|(name, of)| format!("{} {:?}", **name, of.formulas().map(|text| text.as_str()).collect::<Vec<_>>()))
+        .collect();
+    let friction = if friction.is_empty() { String::new() } else { format!(" {friction:?}") };
+    format!(
+        "{:?} {} {breaks:?} {resets:?}{constraints}{exact}{friction}",
+        pairs(&file.force),
+        tables::fingerprint(tables)
+    )
 }

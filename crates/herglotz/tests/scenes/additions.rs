@@ -517,3 +517,54 @@ fn sticking_and_slipping_alternate_with_their_period() {
     }
     assert_eq!(found.len(), 11);
 }
+
+/// The same motion by friction that sticks by itself: the modes are columns, and the times of the changes those of events.
+#[test]
+fn friction_sticks_and_slips_by_itself() {
+    let text = r#"
+[system]
+coordinates = ["x"]
+lagrangian = "x'^2/2 - k*x^2/2"
+parameters = { k = 1.0, u = 0.3, fs = 1.0, fd = 0.6 }
+[friction.x]
+sliding = "fd"
+sticking = "fs"
+surface = "u"
+[start]
+x = 0.0
+"x'" = 0.3
+[run]
+time = 40.0
+accuracy = 1e-9
+[want]
+rows = { every = 0.5, columns = ["t", "x'", "slip_x"] }
+events = [{ when = "slip_x - 0.5" }]
+[sweep]
+u = [0.1, 0.3]
+"#;
+    let scene = read(text).unwrap();
+    let (found, status) = crossings(&scene);
+    assert_eq!(status, Status::Completed);
+    let (stick, slip) = (0.8 / 0.3, std::f64::consts::PI + 2.0 * f64::atan2(0.3, 0.4));
+    let mut t = 1.0 / 0.3;
+    for (k, crossing) in found.iter().enumerate() {
+        assert!((crossing.t - t).abs() < 1e-8, "{k}: {crossing:?} {t}");
+        t += if k % 2 == 0 { slip } else { stick };
+    }
+    assert_eq!(found.len(), 11);
+    let (_, rows) = scene.system.record(&scene.motion()).unwrap();
+    assert!(rows.iter().all(|row| row[2] != 0.0 || (row[1] - 0.3).abs() < 1e-14), "{rows:?}");
+    for (of, what) in [
+        ("sliding = \"fd\"", "surface = \"fd\""),
+        ("sliding = \"fd\"", "sliding = \"fd*\""),
+        ("[friction.x]", "[friction.y]"),
+        ("surface = \"u\"", "surface = \"x\""),
+        ("time = 40.0", "time = -40.0"),
+    ] {
+        let wrong = read(&text.replace(of, what)).and_then(|scene| {
+            let plan = scene.system.plan(&scene.motion()).map(|_| ());
+            plan.map_err(|error| scene.explain(&error))
+        });
+        assert!(wrong.is_err(), "{what}");
+    }
+}

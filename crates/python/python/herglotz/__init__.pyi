@@ -13,6 +13,7 @@ Pieces: TypeAlias = Literal["linear", "held", "cubic"]
 # A function (t, q, v, z, **parameters), formulas by coordinate, or the formula for a single coordinate.
 Force: TypeAlias = Callable[..., Any] | Mapping[str, Expression | float] | str
 # Equations, functions c(q, **parameters) that vanish, or a list of them.
+Friction: TypeAlias = Mapping[str, Expression | float | tuple[str, Expression | float, Expression | float] | Mapping[str, Expression | float]]
 Constraints: TypeAlias = Expression | Sequence[Expression]
 Impact: TypeAlias = Literal["elastic"] | tuple[Literal["restitution", "conformal"], float]
 # A function (t, q, v, z, **parameters) -> (q, v) or (q, v, z), or formulas by variable.
@@ -32,6 +33,7 @@ class System:
         rayleigh: Sequence[str] = ...,
         breaks: Sequence[float] = ...,
         constraints: Sequence[str] = ...,
+        friction: Sequence[tuple[str, str, str | None, str | None]] = ...,
         kind: tuple[bool, Sequence[str], str] | None = None,
     ) -> System: ...
     @property
@@ -64,6 +66,8 @@ class System:
     def breaks(self) -> list[float]: ...
     @property
     def constraints(self) -> list[str]: ...
+    @property
+    def friction(self) -> list[tuple[str, str, str | None, str | None]]: ...
     @property
     def losses(self) -> list[str]: ...
     def with_parameters(self, parameters: Mapping[str, float]) -> System: ...
@@ -510,6 +514,7 @@ def system(
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
     constraints: Constraints | None = None,
+    friction: Friction | None = None,
 ) -> System: ...
 def solve(
     L: Lagrangian | None = None,
@@ -540,6 +545,7 @@ def solve(
     momenta: Sequence[str] | str | None = None,
     action: str | None = None,
     constraints: Constraints | None = None,
+    friction: Friction | None = None,
     project: bool = False,
     progress: bool = False,
     callback: Callable[[Solution], Any] | None = None,

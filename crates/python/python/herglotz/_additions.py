@@ -21,6 +21,7 @@ class Additions(NamedTuple):
     rayleigh: tuple = ()  # formulas
     breaks: tuple = ()  # times
     constraints: tuple = ()  # formulas
+    friction: tuple = ()  # (coordinate, sliding, sticking or None, surface or None)
 
     def plus(self, other):
         """Both; a table that is given twice is kept once."""
@@ -58,13 +59,14 @@ def table(t, y, pieces="linear"):
     return _core.Table(t, y, pieces)
 
 
-def additions_of(force, rayleigh, tables, breaks, names, constraints=None):
+def additions_of(force, rayleigh, tables, breaks, names, constraints=None, friction=None):
     """The additions from the arguments of `system`, in the names of coordinates, velocities and parameters."""
     found = _checked_tables(tables)
     forces = tuple(_forces_of(force, names, found)) if force is not None else ()
     rayleighs = (text_of("rayleigh", rayleigh, names, found),) if rayleigh is not None else ()
     all_constraints = tuple(_constraints_of(constraints, names, found)) if constraints is not None else ()
-    return Additions(tuple(found.items()), forces, rayleighs, breaks_of(breaks), all_constraints)
+    all_friction = tuple(_friction_of(friction, names, found)) if friction is not None else ()
+    return Additions(tuple(found.items()), forces, rayleighs, breaks_of(breaks), all_constraints, all_friction)
 
 
 def _checked_tables(tables):
@@ -115,6 +117,30 @@ def _constraints_of(constraints, names, tables):
         f"`constraints` is {constraints!r}; it must be a formula such as \"x^2 + y^2 = 1\", a function c(q) that returns a "
         "number or an array, or a list of them"
     )
+
+
+_FRICTION = 'as in friction={"x": "mu*m*g"}, {"x": ("coulomb", "mu", "m*g")} or {"x": {"sliding": 0.6, "sticking": 1.0, "surface": "u"}}'
+
+
+def _friction_of(friction, names, tables):
+    """The friction on coordinates: its size while they slide, the largest one while they stick, the velocity of the surface."""
+    if not hasattr(friction, "items") or not friction:
+        raise ValueError(f"`friction` is {friction!r}; it must give friction by coordinate, {_FRICTION}")
+    found = []
+    for coordinate, of in friction.items():
+        text = lambda part, x: text_of(f"friction[{coordinate!r}]{part}", x, names, tables)  # noqa: E731, B023
+        if isinstance(of, tuple):
+            if len(of) != 3 or of[0] != "coulomb":
+                raise ValueError(f"friction[{coordinate!r}] is {of!r}; it must be a formula, {_FRICTION}")
+            of = {"sliding": f"({text('', of[1])})*({text('', of[2])})"}
+        elif not hasattr(of, "items"):
+            of = {"sliding": of}
+        if unknown := [key for key in of if key not in ("sliding", "sticking", "surface")] or ["sliding"] * ("sliding" not in of):
+            said = "has no entry" if unknown == ["sliding"] else "has the entry"
+            raise ValueError(f"friction[{coordinate!r}] {said} {unknown[0]!r}; give friction {_FRICTION}")
+        parts = [text(f"[{key!r}]", of[key]) if key in of else None for key in ("sliding", "sticking", "surface")]
+        found.append((str(coordinate), *parts))
+    return found
 
 
 def text_of(what, of, names, tables):

@@ -22,7 +22,7 @@ class DifferentiableMotion:
     """The rows of a motion as a function of q0, v0, z0 and of the values of named parameters."""
 
     def __init__(self, L, t, n, names, options):
-        if refused := {"q0", "v0", "p0", "z0", "H", "momenta"} & set(options):
+        if refused := {"q0", "v0", "p0", "z0", "H", "momenta", "friction"} & set(options):
             raise ValueError(
                 f"`{min(refused)}` cannot be given here: a differentiable motion is one of a Lagrangian from q0, v0 and z0 "
                 "with rows at `t`"

@@ -234,7 +234,7 @@ def fit(
         numbers = np.flatnonzero(~np.isnan(values)).tolist()
         series.append((*_series(name, values, values, sigma, names)[:4], (k, numbers)))
     bounded = _bounds(bounds, unknowns)
-    if absolute_sigma and any(deviations is None for *_, deviations in series):
+    if absolute_sigma and any(of[3] is None for of in series):
         raise ValueError("`absolute_sigma` is given without `sigma` of all data: give it, or remove `absolute_sigma`")
     if loss is not None:
         loss = _loss(loss)

@@ -38,9 +38,8 @@ class Method:
         text = _trace.value_text(found, self.function, (coordinates, velocities, [*parameters, step], action), tables)
         if tables:
             raise ValueError(f"the method {self.name!r} contains a table; write the samples as a formula")
-        of = _core.System(
-            text, system.given_coordinates, {**system.parameters, step: 1.0}, [], [], [], [], [], (False, [], action)
-        )
+        values = {**system.parameters, step: 1.0}
+        of = _core.System(text, system.given_coordinates, values, kind=(False, [], action))
         return _core.Method(of, step, self.name, self.order, self.symmetric)
 
 

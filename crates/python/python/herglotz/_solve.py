@@ -40,6 +40,7 @@ def solve(
     momenta=None,
     action=None,
     constraints=None,
+    friction=None,
     project=False,
     progress=False,
     callback=None,
@@ -99,7 +100,7 @@ def solve(
         Times of jumps within the span, in ascending order: steps end there. Those that the formulas show, as samples of
         tables and ``np.where(t < 3, ...)``, are known without it.
 
-    momenta, action, constraints
+    momenta, action, constraints, friction
         As in `system`. ``observe={"tension": "lambda[0]"}`` records the multiplier of the first constraint, whose force is
         the multiplier times its gradient.
     project : bool
@@ -155,6 +156,7 @@ def request_of(
     momenta=None,
     action=None,
     constraints=None,
+    friction=None,
     project=False,
     exact=False,
     also=(),
@@ -164,7 +166,7 @@ def request_of(
     Parameters and tables may be used in the formulas of `also`.
     """
     given = (L if H is None else H, *functions_of(force, rayleigh))
-    more = force, rayleigh, tables, breaks, constraints
+    more = force, rayleigh, tables, breaks, constraints, friction
     kind = H, momenta, action
     if type(L) is not _core.System or parameters is not None or q0 is None or any(
         x is not None for x in (coordinates, *more, *kind)
@@ -232,9 +234,10 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 5, k
     if q0 is None:
         raise ValueError("`q0` is not given: give the initial position")
     n = len(q0) if hasattr(q0, "__len__") else 1
-    force, rayleigh, tables, breaks, *constraints = more
+    force, rayleigh, tables, breaks, *others = more
+    constraints, friction = others or (None, None)
     H, momenta, action = kind
-    names = dict(H=H, momenta=momenta, action=action, constraints=constraints[0] if constraints else None)
+    names = dict(H=H, momenta=momenta, action=action, constraints=constraints, friction=friction)
     of = system_of(L, coordinates, parameters, n=n, force=force, rayleigh=rayleigh, tables=tables, breaks=breaks, **names)
     return of, q0, v0
 

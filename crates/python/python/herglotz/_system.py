@@ -30,6 +30,7 @@ def system(
     tables=None,
     breaks=None,
     constraints=None,
+    friction=None,
 ):
     """The system of a Lagrangian, or of a contact Hamiltonian.
 
@@ -70,6 +71,12 @@ def system(
         ``c(q)`` or ``c(q, l)`` that vanish, each of which returns a number or an array. The motion is that on the
         surface where they hold. The names of Gauss methods then stand for contact Lobatto methods of the same order, and
         those of splittings for RATTLE composed by their schemes. Up to 8 coordinates.
+    friction : dict, optional
+        Dry friction by coordinate, which sticks and slips by itself: the size of the force while the coordinate slides, a
+        formula or a function, as in ``{"x": "mu*m*g"}``; ``("coulomb", mu, N)``; or a dict of ``"sliding"``, of
+        ``"sticking"``, the largest force that holds it while it sticks, and of ``"surface"``, the velocity of the surface, a
+        function of time. The motion has one coordinate more for each, ``slip_x``: 0 while x sticks, 1 and -1 while it slips,
+        the direction of the force.
 
     Returns
     -------
@@ -77,7 +84,7 @@ def system(
     """
     made = system_of(
         L, coordinates, parameters, H=H, momenta=momenta, action=action, n=n, force=force, rayleigh=rayleigh, tables=tables,
-        breaks=breaks, constraints=constraints,
+        breaks=breaks, constraints=constraints, friction=friction,
     )  # fmt: skip
     if n is not None and n != made.dimension:
         raise ValueError(f"`n` is {n!r}, but the system has {made.dimension} coordinates: remove it")
@@ -98,6 +105,7 @@ def system_of(
     tables=None,
     breaks=None,
     constraints=None,
+    friction=None,
 ):
     """See `system`; here `n` is the number of coordinates without names, and does not matter otherwise."""
     if parameters is not None and not hasattr(parameters, "keys"):
@@ -114,7 +122,7 @@ def system_of(
     if isinstance(given, _core.System) and (H is not None or action is not None):
         raise ValueError("a System has its names already: give it as `L`, without `H` and `action`")
     kind = (H is not None, tuple(momenta or ()), "z" if action is None else action)
-    is_plain = force is None and rayleigh is None and not tables and breaks is None and constraints is None
+    is_plain = not tables and all(x is None for x in (force, rayleigh, breaks, constraints, friction))
     if isinstance(L, _core.System):
         own = [coordinates] if isinstance(coordinates, str) else coordinates
         if own is not None and list(own) not in (L.coordinates, L.given_coordinates):
@@ -123,7 +131,7 @@ def system_of(
             return L.with_parameters(parameters) if parameters else L
         text, coordinates, known = L.lagrangian, L.given_coordinates, L.parameters
         parameters = known | dict(parameters or {})
-        more = Additions(tuple(L.tables), tuple(L.forces), tuple(L.rayleigh), tuple(L.breaks), tuple(L.constraints))
+        more = Additions(tuple(L.tables), tuple(L.forces), tuple(L.rayleigh), tuple(L.breaks), tuple(L.constraints), tuple(L.friction))
         kind = (L.kind[0], tuple(L.kind[1]), L.kind[2])
     else:
         found = {}
@@ -131,7 +139,7 @@ def system_of(
         more = Additions(tuple(found.items()))
     if not is_plain:
         of = names_in(coordinates, tuple(parameters or ()), kind)
-        more = more.plus(additions_of(force, rayleigh, tables, breaks, of, constraints))
+        more = more.plus(additions_of(force, rayleigh, tables, breaks, of, constraints, friction))
     return _built(text, coordinates, parameters, more, kind)
 
 
@@ -184,13 +192,18 @@ def check_used(system, parameters, tables, functions, expressions):
     if parameters:
         _check_parameters(system, parameters, functions, expressions)
     if tables:
-        texts = [system.lagrangian, *(text for _, text in system.forces), *system.rayleigh, *system.constraints, *expressions]
+        texts = [system.lagrangian, *(text for _, text in system.forces), *system.rayleigh, *system.constraints, *friction_texts(system), *expressions]
         for name in tables:
             if not any(re.search(rf"\b{re.escape(name)}\s*\(", text) for text in texts):
                 raise ValueError(
                     f"the table {name!r} is not used in the Lagrangian, a force, an event or a column: write {name}(t) there, "
                     "or remove the table"
                 )
+
+
+def friction_texts(system):
+    """The formulas of friction."""
+    return [text for _, *parts in system.friction for text in parts if text is not None]
 
 
 def _check_parameters(system, given, functions, expressions):

@@ -13,6 +13,9 @@ use model::FitModel;
 /// The method of a motion that names none: with 8 stages few steps are needed, and its tangents are exact.
 const METHOD: AnyIntegrator = AnyIntegrator::Gauss { stages: 8 };
 
+/// The same under constraints, where it stands for the contact Lobatto method of order 8.
+const UNDER_CONSTRAINTS: AnyIntegrator = AnyIntegrator::Gauss { stages: 4 };
+
 /// An unknown of a fit, with its bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknown {

@@ -1,7 +1,7 @@
 //! The model of a fit: quantities of a motion as functions of its unknowns.
 
 use super::event_series::{LATER, SignChange, event_time};
-use super::{Fit, FitError, FittedMotion, FittedSeries, METHOD, MotionFit, MultiStart};
+use super::{Fit, FitError, FittedMotion, FittedSeries, METHOD, MotionFit, MultiStart, UNDER_CONSTRAINTS};
 use crate::kernel::{Differentiated, of_expression};
 use crate::{
     Column, Event, InitialVelocity, Motion, RunMonitor, RuntimeError, Start, StateDerivative, StepControl, System,
@@ -101,8 +101,7 @@ impl<'a> FitModel<'a> {
             let why = "cut a motion whose times of events are fitted; fit them without nodes";
             return Err(RuntimeError::argument("nodes", why));
         }
-        // Sign changes may be later until the unknowns are found.
-        let end = if has_events { end + LATER * (end - t0) } else { end };
+        // Steps are chosen up to the last of the data: beyond it resets may accumulate.
         let motion = Motion {
             end,
             rows: None,
@@ -112,8 +111,13 @@ impl<'a> FitModel<'a> {
             estimate: false,
             ..request.motion.clone()
         };
+        let mut motion = with_fixed_steps(system, motion, request.motion.end)?;
+        if has_events {
+            // Sign changes may be later until the unknowns are found.
+            motion.end += LATER * (end - t0);
+        }
         Ok(FitModel {
-            motion: with_fixed_steps(system, motion, request.motion.end)?,
+            motion,
             system,
             names: request.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
             unknowns,
@@ -466,7 +470,7 @@ fn quantity(system: &System, text: &str) -> Result<Quantity, RuntimeError> {
 fn with_fixed_steps(system: &System, motion: Motion, end: f64) -> Result<Motion, RuntimeError> {
     let (by, size) = match motion.step_control {
         StepControl::Accuracy { error, by } => {
-            let by = by.unwrap_or(METHOD);
+            let by = by.unwrap_or(if system.formula().constraints() > 0 { UNDER_CONSTRAINTS } else { METHOD });
             let planned = Motion { step_control: StepControl::Accuracy { error, by: Some(by) }, ..motion.clone() };
             (by, system.plan(&planned)?.step_size)
         }

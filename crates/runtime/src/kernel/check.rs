@@ -1,7 +1,7 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
 use super::Kernel;
-use super::discrete::custom;
+use super::discrete::{custom, of_lagrangians};
 use super::formula_system::FormulaSystem;
 use super::many::{ManyCoordinates, few, gauss};
 use super::sized::{Sized, coordinates};
@@ -81,7 +81,12 @@ fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     let by = match by {
         MapBy::Named(by) => *by,
         MapBy::Method(method) => {
-            return Ok(problem.by(custom(method, problem.lagrangian())?).steps(Steps::Count(count)));
+            // Written so that it is not compiled for Hamiltonians.
+            if const { L::HINTS.hamiltonian } {
+                return Err(of_lagrangians());
+            } else {
+                return Ok(problem.by(custom(method, problem.lagrangian())?).steps(Steps::Count(count)));
+            }
         }
     };
     Ok(match (problem.lagrangian().constrained(by)?, by) {
@@ -314,9 +319,8 @@ pub(super) fn modified_defects<L: FormulaSystem<N>, const N: usize>(
     let (by, h, problem) = (integrator(system.0.formula(), motion, &plan)?, plan.step_size, system.problem_of(motion)?);
     let span = (motion.end - motion.start.t).abs().min(MODIFIED_STEPS * h.abs());
     let by = match by {
-        MapBy::Method(method) => {
-            let by = custom(&method, &system.0)?;
-            return Ok(hamiltonian::modified_defects(&problem, &by, span, &[h, 0.5 * h, 0.25 * h], most)?);
+        MapBy::Method(_) => {
+            return Err(RuntimeError::argument("method", "has no modified Hamiltonian here; name an integrator"));
         }
         MapBy::Named(Some(by)) => L::by(by)?,
         // Constraints are refused before.

@@ -45,6 +45,11 @@ pub(super) fn custom<L: FormulaSystem<N>, const N: usize>(
     Ok(if of.symmetric { custom.symmetric() } else { custom })
 }
 
+/// The error for a Hamiltonian, which has no discrete Lagrangian.
+pub(super) fn of_lagrangians() -> RuntimeError {
+    RuntimeError::OfLagrangians { what: "discrete Lagrangians" }
+}
+
 impl<const N: usize> FormulaStep<N> {
     /// That of a method for steps of one length.
     ///

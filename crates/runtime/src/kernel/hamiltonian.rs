@@ -37,6 +37,13 @@ pub(super) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
     }
 }
 
+impl<const N: usize> Sized<Hamiltonian<N>, N> {
+    /// The system with as many coordinates as any: derivatives are compiled for these alone.
+    fn differentiable(&self) -> Result<Sized<Hamiltonian<MOST>, MOST>, RuntimeError> {
+        Ok(Sized(OfHamiltonian(self.0.formula().hamiltonian_within::<MOST>()?)))
+    }
+}
+
 impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
     fn formula(&self) -> &Formula {
         self.0.formula()
@@ -95,7 +102,7 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
         of: Differentiated<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
-        sensitivity::tangent(self, motion, of, monitor)
+        sensitivity::tangent(&self.differentiable()?, motion, of, monitor)
     }
 
     fn gradient(
@@ -105,7 +112,7 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
-        sensitivity::gradient(self, motion, times, loss, monitor)
+        sensitivity::gradient(&self.differentiable()?, motion, times, loss, monitor)
     }
 
     fn lyapunov_exponents(
@@ -113,7 +120,7 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
         motion: &Motion,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
-        sensitivity::lyapunov_exponents(self, motion, monitor)
+        sensitivity::lyapunov_exponents(&self.differentiable()?, motion, monitor)
     }
 
     /// The geometry at a momentum, or at a velocity that has one.

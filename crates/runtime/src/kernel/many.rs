@@ -4,7 +4,7 @@ use super::formula_system::Observed;
 use super::recorder::Recorder;
 use super::run::{outcome_of, plan_of, requested};
 use super::sensitivity::{exponents_of, loss_gradient, unobserved};
-use super::sized::{checked, initial_state};
+use super::sized::{check_direction, checked, initial_state};
 use super::{Differentiated, Kernel, check, ensemble};
 use crate::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Loss, LossGradient, LyapunovExponents, Motion, Outcome, Plan,
@@ -183,6 +183,7 @@ impl ManyCoordinates {
     }
 
     pub(super) fn problem(&self, motion: &Motion) -> Result<SystemProblem<'_>, RuntimeError> {
+        check_direction(self.0.formula(), motion.start.t, motion.end)?;
         let start = initial_state(self.0.formula(), &motion.start)?;
         let problem = SystemProblem::new(self, motion.start.t, start)?;
         let force = self.applied_force(motion.start.t, problem.start());

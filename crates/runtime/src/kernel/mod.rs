@@ -35,6 +35,7 @@ use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
 use formula_system::FormulaSystem;
 pub(crate) use run::LOSSES_WITH_FORCE;
 use sized::Sized;
+pub(crate) use sized::check_direction;
 use std::sync::Arc;
 use work_thread::on_large_stack;
 

@@ -33,12 +33,17 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
         StepControl::Steps { by, .. } => Some(by),
     };
     if let Some(method) = &motion.method {
-        let by = discrete::custom::<L, N>(method, &system.0)?;
-        let run = match motion.step_control {
-            StepControl::Accuracy { error, .. } => problem.by(by).accuracy(error),
-            StepControl::Steps { steps, .. } => problem.by(by).steps(steps),
-        };
-        return scaled(system, run, motion);
+        // Written so that it is not compiled for Hamiltonians.
+        if const { L::HINTS.hamiltonian } {
+            return Err(discrete::of_lagrangians());
+        } else {
+            let by = discrete::custom::<L, N>(method, &system.0)?;
+            let run = match motion.step_control {
+                StepControl::Accuracy { error, .. } => problem.by(by).accuracy(error),
+                StepControl::Steps { steps, .. } => problem.by(by).steps(steps),
+            };
+            return scaled(system, run, motion);
+        }
     }
     let run = match (motion.step_control, system.0.constrained(by)?) {
         (StepControl::Accuracy { error, .. }, Some(method)) => problem.by(method).accuracy(error),

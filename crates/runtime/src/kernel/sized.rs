@@ -34,8 +34,29 @@ pub(super) fn checked(formula: &Formula, what: &'static str, numbers: &[f64]) ->
     }
 }
 
+/// A start with the modes of friction, from one without them.
+fn completed(formula: &Formula, start: &Start) -> Option<Start> {
+    let InitialVelocity::Velocity(v) = &start.velocity else { return None };
+    if !start.q.iter().chain(v).chain([&start.t, &start.z]).all(|x| x.is_finite()) {
+        return None;
+    }
+    let [q, v] = formula.completed(start.t, &start.q, v, start.z)?;
+    Some(Start { q, velocity: InitialVelocity::Velocity(v), ..start.clone() })
+}
+
+/// Refuses motions backward in time with friction, where the time at which a coordinate came to stick is lost.
+pub(crate) fn check_direction(formula: &Formula, start: f64, end: f64) -> Result<(), RuntimeError> {
+    if formula.has_friction() && end < start {
+        let why = "runs backward, but a motion with friction that sticks has no unique past; give a later time";
+        return Err(RuntimeError::argument("t", why));
+    }
+    Ok(())
+}
+
 /// The start of a motion of a formula, validated.
 pub(super) fn initial_state(formula: &Formula, start: &Start) -> Result<InitialState, RuntimeError> {
+    let with_modes = completed(formula, start);
+    let start = with_modes.as_ref().unwrap_or(start);
     for (what, value) in [("t", start.t), ("z", start.z)] {
         if !value.is_finite() {
             return Err(RuntimeError::NotFinite { what: what.into(), value });
@@ -81,6 +102,7 @@ impl<L: FormulaSystem<N>, const N: usize> Sized<L, N> {
     /// The problem of a motion, with the interrupt of the motion for its trial runs.
     pub fn problem_of<'m>(&'m self, motion: &'m Motion) -> Result<Problem<'m, L, N>, RuntimeError> {
         check_projection(self.0.formula(), motion)?;
+        check_direction(self.0.formula(), motion.start.t, motion.end)?;
         let problem = self.problem(&motion.start)?;
         let problem = match motion.project {
             true => Problem::new(&self.0, motion.start.t, self.0.projected(motion.start.t, *problem.start())?)?,

@@ -33,6 +33,9 @@ fn rows(system: &System, motion: &Motion) -> Vec<f64> {
     system.record(&Motion { rows, columns: columns.to_vec(), events: Vec::new(), ..motion.clone() }).unwrap().1.concat()
 }
 
+/// The rows of a motion, and the times of its sign changes.
+type Seen = (Vec<f64>, Vec<f64>);
+
 #[test]
 fn derivatives_of_hamiltonians() {
     let names = ["k", "c", "x", "y", "p_x", "p_y", "z"];
@@ -58,8 +61,7 @@ fn derivatives_of_hamiltonians() {
             };
             let d = 1e-3;
             let [a, b, c, e] = [d, -d, 2.0 * d, -2.0 * d].map(moved);
-            let slope =
-                |of: &dyn Fn(&(Vec<f64>, Vec<f64>)) -> f64| (8.0 * (of(&a) - of(&b)) - (of(&c) - of(&e))) / (12.0 * d);
+            let slope = |of: &dyn Fn(&Seen) -> f64| (8.0 * (of(&a) - of(&b)) - (of(&c) - of(&e))) / (12.0 * d);
             let columns = slopes.rows.iter().flat_map(|row| {
                 let row = &row[k];
                 row.q.iter().chain(&row.v).chain(&row.p).copied().chain([row.z]).collect::<Vec<_>>()
