@@ -2,13 +2,25 @@
 
 use super::SignChanges;
 use super::model::{FitModel, Quantity, undefined};
-use crate::{Crossing, EventAt, Motion, RunMonitor, RuntimeError, System};
+use crate::{Crossing, EventAt, Motion, RunMonitor, RuntimeError, StepControl, System};
+use discrete_herglotz::Steps;
 use herglotz_fit::ModelFailure;
 use std::ops::ControlFlow;
 
 /// The part of the span by which sign changes may be later than those that were measured, for values of the unknowns that are
 /// not yet fitted.
 pub(super) const LATER: f64 = 0.5;
+
+/// The least number of steps up to the last of the data: a step in which resets accumulate is lost as a whole, with the sign
+/// changes in it.
+pub(super) const LEAST_STEPS: f64 = 64.0;
+
+/// Makes the steps of a motion at most as long as this.
+pub(super) fn shorten(motion: &mut Motion, most: f64) {
+    if let StepControl::Steps { steps: Steps::Size(size), .. } = &mut motion.step_control {
+        *size = size.min(most);
+    }
+}
 
 /// A sign change of an event: the index of the event, and the number of the sign change in the order of the motion.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! The model of a fit: quantities of a motion as functions of its unknowns.
 
-use super::event_series::{LATER, SignChange, event_time};
+use super::event_series::{LATER, LEAST_STEPS, SignChange, event_time, shorten};
 use super::{Fit, FitError, FittedMotion, FittedSeries, METHOD, MotionFit, MultiStart, UNDER_CONSTRAINTS};
 use crate::kernel::{Differentiated, of_expression};
 use crate::{
@@ -115,6 +115,7 @@ impl<'a> FitModel<'a> {
         if has_events {
             // Sign changes may be later until the unknowns are found.
             motion.end += LATER * (end - t0);
+            shorten(&mut motion, (end - t0) / LEAST_STEPS);
         }
         Ok(FitModel {
             motion,
