@@ -12,6 +12,7 @@ mod friction;
 mod jump_times;
 mod lyapunov_of_impacts;
 mod motions;
+mod own_methods;
 mod pairs;
 mod path;
 mod rest;

@@ -2,7 +2,7 @@
 
 use super::formula_system::FormulaSystem;
 use crate::{FormulaMethod, RuntimeError};
-use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
+use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Arguments, DiscreteJet, DiscretePoint, Scalar, ScalarSystem, SecondDiscreteJet, Slopes};
 use discrete_herglotz::{CustomMethod, DiscreteLagrangian, InputError, StepError};
 use formula_lagrangian::FormulaDerivatives;
@@ -98,23 +98,28 @@ impl<const N: usize> DiscreteLagrangian<N> for FormulaStep<N> {
 
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
         let n = self.n;
-        let square = || DMatrix::<f64>::zeros(n, n);
+        // Matrices of n x n entries by columns, without the coordinates beyond.
+        let square = || SMatrix::<f64, N, N>::zeros();
         let (mut d11, mut d12, mut d22) = (square(), square(), square());
         let (mut d1z, mut d2z, mut dzz) = (SVector::<f64, N>::zeros(), SVector::<f64, N>::zeros(), 0.0);
-        let (mut q, mut v, mut z) = (vec![0.0; n], vec![0.0; n], 0.0);
+        let (mut d1, mut d2, mut dz) = (SVector::<f64, N>::zeros(), SVector::<f64, N>::zeros(), 0.0);
         let at = Arguments { t, q: &x.q0.as_slice()[..n], v: &x.q1.as_slice()[..n], z: x.z0 };
         let second = [
-            d11.as_mut_slice(),
-            d12.as_mut_slice(),
-            d22.as_mut_slice(),
+            &mut d11.as_mut_slice()[..n * n],
+            &mut d12.as_mut_slice()[..n * n],
+            &mut d22.as_mut_slice()[..n * n],
             &mut d1z.as_mut_slice()[..n],
             &mut d2z.as_mut_slice()[..n],
             std::slice::from_mut(&mut dzz),
         ];
-        self.of.with_second_derivatives::<f64, 0>(at, Slopes { q: &mut q, v: &mut v, z: &mut z }, second);
-        let of_free = |sign: f64| move |i: usize, j: usize| if i == j { sign / self.h } else { 0.0 };
-        let matrix = |of: &DMatrix<f64>, sign: f64| {
-            SMatrix::from_fn(|i, j| if i < n && j < n { of[(i, j)] } else { of_free(sign)(i, j) })
+        let slopes = Slopes { q: &mut d1.as_mut_slice()[..n], v: &mut d2.as_mut_slice()[..n], z: &mut dz };
+        self.of.with_second_derivatives::<f64, 0>(at, slopes, second);
+        let matrix = |of: &SMatrix<f64, N, N>, of_free: f64| {
+            SMatrix::from_fn(|i, j| match (i < n && j < n, i == j) {
+                (true, _) => of.as_slice()[i + n * j],
+                (false, true) => of_free / self.h,
+                (false, false) => 0.0,
+            })
         };
         let found = SecondDiscreteJet {
             first: self.jet(t, x)?,
