@@ -93,7 +93,9 @@ fn invalid_requests_are_errors_with_the_remedy() {
     let error = kinked.sensitivity(&split, &["x"], &[1.0], &mut ()).unwrap_err().to_string();
     assert!(error.contains("choose a Gauss method such as \"gauss_8\""), "{error}");
     let event = Event { terminal: true, ..Event::new(system.formula().expression("x").unwrap()) };
-    assert!(said(&Motion { events: vec![event], ..good.clone() }, "gamma").contains("terminal event"));
+    let ends = Motion { events: vec![event], ..good.clone() };
+    let error = system.lyapunov_exponents(&ends, &mut ()).unwrap_err().to_string();
+    assert!(error.contains("terminal event"), "{error}");
     let undefined = system.formula().expression("sqrt(x - 10)").unwrap();
     let error = system.end_gradient(&good, &undefined, &mut ()).unwrap_err();
     assert!(matches!(error, RuntimeError::Sensitivity(_)), "{error}");
