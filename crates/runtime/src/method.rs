@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// // The midpoint rule, h L(t, (q0 + q1)/2, (q1 - q0)/h, z0).
 /// let text = "h*(((x' - x)/h)^2/2 - ((x + x')/2)^2/2 - z/10)";
 /// let method = FormulaMethod::new("mine", 1, &Formula::parse(text, &["x"], &[("h", 1.0)])?, "h")?;
-/// let way = StepControl::Steps { by: AnyIntegrator::default(), steps: Steps::Size(0.1) };
+/// let way = StepControl::Steps { by: AnyIntegrator::Gauss { stages: 1 }, steps: Steps::Size(0.1) };
 /// let motion = Motion { method: Some(method), ..Motion::new(Start::new(0.0, [1.0], [0.0], 0.0), 10.0, way) };
 /// assert_eq!(system.plan(&motion)?.integrator.name, "mine");
 /// assert!(system.check(&motion, 5)?.is_contact());
