@@ -135,9 +135,10 @@ def _friction_of(friction, names, tables):
             of = {"sliding": f"({text('', of[1])})*({text('', of[2])})"}
         elif not hasattr(of, "items"):
             of = {"sliding": of}
-        if unknown := [key for key in of if key not in ("sliding", "sticking", "surface")] or ["sliding"] * ("sliding" not in of):
-            said = "has no entry" if unknown == ["sliding"] else "has the entry"
-            raise ValueError(f"friction[{coordinate!r}] {said} {unknown[0]!r}; give friction {_FRICTION}")
+        if unknown := [key for key in of if key not in ("sliding", "sticking", "surface")]:
+            raise ValueError(f"friction[{coordinate!r}] has the entry {unknown[0]!r}; give friction {_FRICTION}")
+        if "sliding" not in of:
+            raise ValueError(f"friction[{coordinate!r}] has no entry 'sliding'; give friction {_FRICTION}")
         parts = [text(f"[{key!r}]", of[key]) if key in of else None for key in ("sliding", "sticking", "surface")]
         found.append((str(coordinate), *parts))
     return found

@@ -60,6 +60,21 @@ impl<const N: usize> FormulaStep<N> {
         Ok(FormulaStep { of, n: method.dimension(), h })
     }
 
+    /// The jet with the terms of the free particles.
+    fn with_free(
+        &self,
+        x: &DiscretePoint<N>,
+        (mut value, mut d1, mut d2, dz): (f64, SVector<f64, N>, SVector<f64, N>, f64),
+    ) -> Result<DiscreteJet<N>, StepError> {
+        for i in self.n..N {
+            let u = (x.q1[i] - x.q0[i]) / self.h;
+            value += self.h * u * u / 2.0;
+            (d1[i], d2[i]) = (-u, u);
+        }
+        let is_finite = value.is_finite() && dz.is_finite() && d1.iter().chain(&d2).all(|x| x.is_finite());
+        Self::checked(DiscreteJet::new(value, d1, d2, dz), is_finite)
+    }
+
     /// Fails where a number is not finite.
     fn checked<T>(found: T, is_finite: bool) -> Result<T, StepError> {
         if is_finite { Ok(found) } else { Err(StepError::NonFinite) }
@@ -86,14 +101,8 @@ impl<const N: usize> DiscreteLagrangian<N> for FormulaStep<N> {
         let n = self.n;
         let (q0, q1) = (&x.q0.as_slice()[..n], &x.q1.as_slice()[..n]);
         let slopes = Slopes { q: &mut d1.as_mut_slice()[..n], v: &mut d2.as_mut_slice()[..n], z: &mut dz };
-        let mut value = self.of.with_gradient::<f64, 0>(t, q0, q1, x.z0, slopes);
-        for i in n..N {
-            let u = (x.q1[i] - x.q0[i]) / self.h;
-            value += self.h * u * u / 2.0;
-            (d1[i], d2[i]) = (-u, u);
-        }
-        let is_finite = value.is_finite() && dz.is_finite() && d1.iter().chain(&d2).all(|x| x.is_finite());
-        Self::checked(DiscreteJet::new(value, d1, d2, dz), is_finite)
+        let value = self.of.with_gradient::<f64, 0>(t, q0, q1, x.z0, slopes);
+        self.with_free(x, (value, d1, d2, dz))
     }
 
     fn second_jet(&self, t: f64, x: &DiscretePoint<N>) -> Result<SecondDiscreteJet<N>, StepError> {
@@ -113,7 +122,7 @@ impl<const N: usize> DiscreteLagrangian<N> for FormulaStep<N> {
             std::slice::from_mut(&mut dzz),
         ];
         let slopes = Slopes { q: &mut d1.as_mut_slice()[..n], v: &mut d2.as_mut_slice()[..n], z: &mut dz };
-        self.of.with_second_derivatives::<f64, 0>(at, slopes, second);
+        let value = self.of.with_second_derivatives::<f64, 0>(at, slopes, second);
         let matrix = |of: &SMatrix<f64, N, N>, of_free: f64| {
             SMatrix::from_fn(|i, j| match (i < n && j < n, i == j) {
                 (true, _) => of.as_slice()[i + n * j],
@@ -122,7 +131,7 @@ impl<const N: usize> DiscreteLagrangian<N> for FormulaStep<N> {
             })
         };
         let found = SecondDiscreteJet {
-            first: self.jet(t, x)?,
+            first: self.with_free(x, (value, d1, d2, dz))?,
             d11: matrix(&d11, 1.0),
             d12: matrix(&d12, -1.0),
             d22: matrix(&d22, 1.0),

@@ -1,14 +1,12 @@
 //! Derivatives of the times of events, from those of the states at these times.
 
 use super::formula_system::Observed;
+use super::recorder::ROUND_OFF_OF_TIMES;
 use super::sensitivity::{covector, sensitivity_of};
 use crate::{EndCovector, Event, EventAt, Motion, MotionState, RuntimeError, Sensitivity};
 use discrete_herglotz::sensitivity::{Differentiable, SwitchTime, Tangent, TangentRow, Variable};
 use discrete_herglotz::{Point, Status, Vector};
 use formula_lagrangian::{Expression, ExpressionGradient};
-
-/// The round-off of the times of a run, relative to the largest of them.
-const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
 
 /// The distance of the time of a reset in two runs, whose roots may have other guesses, relative to the largest time.
 const SAME_RESET: f64 = 1e-10;
@@ -124,7 +122,7 @@ fn switch_at<'t>(
     motion: &Motion,
     observed: &dyn Observed,
 ) -> Option<&'t SwitchTime> {
-    let distance = if event.reset.is_some() { SAME_RESET } else { ROUND_OFF };
+    let distance = if event.reset.is_some() { SAME_RESET } else { ROUND_OFF_OF_TIMES };
     let round_off = distance * motion.start.t.abs().max(motion.end.abs());
     let is_of_event = |switch: &&SwitchTime| match observed.reset_of(switch.index) {
         Some(reset) => event.reset.is_none_or(|of_event| of_event == reset),

@@ -211,15 +211,15 @@ impl ManyCoordinates {
         Ok(requested(run, motion, scales))
     }
 
-    /// Calls a function with the run of a motion and its observer.
+    /// Calls a function with the run of a motion, which may end after a time, and its observer.
     fn observed<R>(
         &self,
         motion: &Motion,
-        monitor: &mut dyn RunMonitor,
+        (monitor, until): (&mut dyn RunMonitor, Option<f64>),
         work: impl FnOnce(Run<'_, '_>) -> Result<R, RuntimeError>,
     ) -> Result<R, RuntimeError> {
         let problem = self.problem(motion)?;
-        let mut recorder = Recorder::new(self, motion, monitor)?;
+        let mut recorder = Recorder::new(self, motion, monitor)?.until(until);
         work(self.with_problem(&problem, motion)?.observe(&mut recorder))
     }
 }
@@ -272,7 +272,7 @@ impl Kernel for ManyCoordinates {
     }
 
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
-        self.observed(motion, &mut (), |run| plan_of(&run, motion, self.0.formula(), self.0.has_force()))
+        self.observed(motion, (&mut (), None), |run| plan_of(&run, motion, self.0.formula(), self.0.has_force()))
     }
 
     fn run(
@@ -281,7 +281,7 @@ impl Kernel for ManyCoordinates {
         monitor: &mut dyn RunMonitor,
         from: Option<ResumeState>,
     ) -> Result<Outcome, RuntimeError> {
-        self.observed(motion, monitor, |run| outcome_of(run, motion, from, self.0.formula().dimension()))
+        self.observed(motion, (monitor, None), |run| outcome_of(run, motion, from, self.0.formula().dimension()))
     }
 
     fn sensitivity(
@@ -291,8 +291,9 @@ impl Kernel for ManyCoordinates {
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
         let (until, problem) = (Until::Time(motion.end), self.problem(motion)?);
-        self.observed(&unobserved(motion), monitor, |run| {
-            let found = run.tangent_at(of.variables, &of.row_times(motion), until)?;
+        let times = of.row_times(motion);
+        self.observed(&unobserved(motion), (monitor, times.last().copied()), |run| {
+            let found = run.tangent_at(of.variables, &times, until)?;
             of.of(&found, motion, (self, &problem.differentiable()))
         })
     }
@@ -305,7 +306,7 @@ impl Kernel for ManyCoordinates {
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
         let until = Until::Time(motion.end);
-        self.observed(&unobserved(motion), monitor, |run| {
+        self.observed(&unobserved(motion), (monitor, None), |run| {
             Ok(loss_gradient(run.gradient_at(times, |states| loss(states), until)?, self.dimension()))
         })
     }
@@ -316,7 +317,7 @@ impl Kernel for ManyCoordinates {
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
         let until = Until::Time(motion.end);
-        self.observed(&unobserved(motion), monitor, |run| {
+        self.observed(&unobserved(motion), (monitor, None), |run| {
             let has_noncontact_resets = self.0.formula().has_noncontact_resets();
             Ok(exponents_of(run.lyapunov_exponents(until)?, self.0.proved(), self.0.has_force(), has_noncontact_resets))
         })

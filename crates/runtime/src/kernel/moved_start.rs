@@ -2,7 +2,7 @@
 
 use super::formula_system::FormulaSystem;
 use super::sized::Sized;
-use crate::{Gradient, Motion, RuntimeError, Start, StateDerivative};
+use crate::{Gradient, InitialVelocity, Motion, RuntimeError, StateDerivative};
 use contact_geom::Parametric;
 use contact_geom::nalgebra::{DMatrix, DVector, RowDVector};
 use discrete_herglotz::Vector;
@@ -153,9 +153,7 @@ fn combined(columns: &[StateDerivative], factors: &RowDVector<f64>, other: Optio
 
 /// Refuses a start that is moved from given momenta, whose variables are not those of the start on the constraints.
 pub(super) fn check(motion: &Motion) -> Result<(), RuntimeError> {
-    use crate::InitialVelocity;
-    let Start { velocity, .. } = &motion.start;
-    if motion.project && !matches!(velocity, InitialVelocity::Velocity(_)) {
+    if motion.project && !matches!(motion.start.velocity, InitialVelocity::Velocity(_)) {
         let why = "is requested of a start with given momenta; for derivatives give velocities, or a start on the constraints";
         return Err(RuntimeError::argument("project", why));
     }

@@ -19,8 +19,9 @@ use std::rc::Rc;
 /// The number of steps between two polls: a poll is then inexpensive compared with the steps.
 const STEPS_BETWEEN_POLLS: usize = 256;
 
-/// The round-off of the times of a run, relative to the largest of them.
-const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+/// The round-off of the times of a run, which are sums of its start and of its steps, and of roots within steps, relative to the
+/// largest of them.
+pub(super) const ROUND_OFF_OF_TIMES: f64 = 64.0 * f64::EPSILON;
 
 /// Observes a motion on behalf of a [`RunMonitor`].
 pub(super) struct Recorder<'r> {
@@ -83,7 +84,7 @@ impl<'r> Recorder<'r> {
     fn is_over(&self, t: f64) -> bool {
         let (Some(until), Some(RunInfo { t0, t_end, .. })) = (self.until, self.run_info) else { return false };
         let beyond = if t_end < t0 { until - t } else { t - until };
-        beyond > ROUND_OFF * t0.abs().max(t_end.abs())
+        beyond > ROUND_OFF_OF_TIMES * t0.abs().max(t_end.abs())
     }
 
     /// Passes on the rows, up to a time if one is given.
