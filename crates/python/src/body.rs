@@ -1,6 +1,7 @@
 //! Motions of rigid bodies.
 
-use crate::arrays::{matrix, number, numbers, value_error, vector};
+use crate::arrays::{matrix, number, numbers, value_error, vector, whole};
+use crate::checks::{Checked, checked};
 use crate::signals::Signals;
 use crate::watch::{GivenWatch, Watch};
 use herglotz_runtime::{
@@ -263,6 +264,48 @@ pub fn run_rigid_body(
         record.derivatives = Some((by_rows(py, &in_start)?, by_rows(py, &in_parameters)?, log_factor, contact_defect));
     }
     Ok(record)
+}
+
+/// The plan of a motion: its text, the integrator, the length and the number of the steps, and the bound of the error.
+#[pyfunction]
+pub fn plan_rigid_body(
+    py: Python<'_>,
+    body: BodyRequest<'_>,
+    start: StartRequest<'_>,
+    t: Bound<'_, PyAny>,
+    every: Option<usize>,
+    way: WayRequest<'_>,
+    events: Vec<EventRequest>,
+) -> PyResult<(String, String, f64, usize, Option<f64>)> {
+    let (body, signals) = (body_of(&body)?, Signals::new());
+    let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
+    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
+    let plan = py.detach(|| body.plan(&motion));
+    if let Some(raised) = signals.take() {
+        return Err(raised);
+    }
+    let plan = plan.map_err(value_error)?;
+    Ok((plan.text, plan.integrator.name.to_string(), plan.step_size, plan.steps, plan.error))
+}
+
+/// Whether the steps of a motion are contact transformations.
+#[pyfunction]
+pub fn check_rigid_body(
+    py: Python<'_>,
+    body: BodyRequest<'_>,
+    start: StartRequest<'_>,
+    t: Bound<'_, PyAny>,
+    way: WayRequest<'_>,
+    places: Bound<'_, PyAny>,
+) -> PyResult<Checked> {
+    let (body, signals, places) = (body_of(&body)?, Signals::new(), whole("places", &places, 1)?);
+    let motion = motion_of(&start, crate::motion::times(&t)?, None, step_control(way)?, Vec::new())?;
+    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
+    let found = py.detach(|| body.check(&motion, places));
+    match signals.take() {
+        Some(raised) => Err(raised),
+        None => Ok(checked(found.map_err(value_error)?)),
+    }
 }
 
 /// The angular velocity at the start of a motion between two attitudes.

@@ -62,7 +62,7 @@ type Sample = (f64, f64, f64, f64, f64, Vec<(f64, f64)>);
 
 /// A check: the integrator, the step, the samples, the theorems, whether every step is a contact transformation, and the
 /// reason why it is not to be expected.
-type Checked = (String, f64, Vec<Sample>, Vec<(String, String, f64)>, bool, Option<String>);
+pub type Checked = (String, f64, Vec<Sample>, Vec<(String, String, f64)>, bool, Option<String>);
 
 /// Whether the steps of a motion are contact transformations, and the residuals of the theorems of the discrete theory
 /// along it.
@@ -79,7 +79,11 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     if let Some(raised) = raised {
         return Err(raised);
     }
-    let found = found.map_err(value_error)?;
+    Ok(checked(found.map_err(value_error)?))
+}
+
+/// The numbers of a check.
+pub fn checked(found: herglotz_runtime::Check) -> Checked {
     let is_contact = found.is_contact();
     let sample = |sample: herglotz_runtime::Sample| {
         let momenta = sample.momenta.iter().map(|m| (m.momentum, m.predicted)).collect();
@@ -89,7 +93,7 @@ pub fn check(py: Python<'_>, motion: &Motion, places: Bound<'_, PyAny>) -> PyRes
     let stated = |s: herglotz_runtime::StatementResidual| (s.statement.to_string(), s.method, s.residual);
     let statements = found.statements.into_iter().map(stated).collect();
     let reason = found.not_contact.map(|reason| reason.to_string());
-    Ok((found.integrator, found.step_size, samples, statements, is_contact, reason))
+    (found.integrator, found.step_size, samples, statements, is_contact, reason)
 }
 
 /// A run of a comparison: integrator, order, step, steps, evaluations, error and seconds.

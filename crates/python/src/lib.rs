@@ -33,7 +33,10 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use crate::body::{BodyRecord, rigid_body_between, rigid_body_parameters, run_rigid_bodies, run_rigid_body};
+    use crate::body::{
+        BodyRecord, check_rigid_body, plan_rigid_body, rigid_body_between, rigid_body_parameters, run_rigid_bodies,
+        run_rigid_body,
+    };
     #[pymodule_export]
     use crate::checks::{check, compare, geometry, hamiltonian_geometry};
     #[pymodule_export]
@@ -63,7 +66,7 @@ mod _core {
     #[pymodule_export]
     use crate::sensitivity::{lyapunov_exponents, pullback, sensitivity, value_and_gradient};
     #[pymodule_export]
-    use crate::sparse::{run_bodies, run_lattice};
+    use crate::sparse::{bodies_terms, lattice_terms, run_bodies, run_lattice};
     #[pymodule_export]
     use crate::symbol::Symbol;
     #[pymodule_export]

@@ -6,10 +6,11 @@ use crate::signals::Signals;
 use crate::watch::GivenWatch;
 use herglotz_runtime::{
     AnyIntegrator, Bodies, Boundary, InitialVelocity, Lattice, OutputTimes, RuntimeError, SiteMotion, SiteSystem,
-    Start, Steps,
+    Start, Steps, SumOfTerms,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::collections::BTreeMap;
 
 /// The arguments of a motion: q0, v0 or p0 as flat arrays, whether it is p0, and z0; t; every; integrator, step, steps;
 /// and whether the conformal factor is requested.
@@ -50,11 +51,53 @@ pub fn run_lattice(
     request: Request<'_>,
     watch: GivenWatch,
 ) -> PyResult<Record> {
-    let (coordinates, site, bond) = formulas;
+    let lattice = lattice(formulas, sizes, boundary, parameters)?;
+    run(py, (request, watch), || lattice.system())
+}
+
+/// The text, the coordinates and the parameters of a system.
+type Terms = (String, Vec<String>, BTreeMap<String, f64>);
+
+/// The Lagrangian of bodies as text.
+#[pyfunction]
+pub fn bodies_terms(
+    masses: Bound<'_, PyAny>,
+    dimensions: usize,
+    g: Bound<'_, PyAny>,
+    gamma: Bound<'_, PyAny>,
+) -> PyResult<Terms> {
+    let (masses, g, gamma) = (numbers("masses", &masses)?, number("G", &g)?, number("gamma", &gamma)?);
+    terms(Bodies { masses, dimensions, g, gamma }.sum_of_terms())
+}
+
+/// The Lagrangian of a lattice as text.
+#[pyfunction]
+#[pyo3(signature = (formulas, sizes, boundary, parameters))]
+pub fn lattice_terms(
+    formulas: (Vec<String>, String, Option<String>),
+    sizes: Vec<usize>,
+    boundary: &str,
+    parameters: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Terms> {
+    let lattice = lattice(formulas, sizes, boundary, parameters)?;
+    lattice.check_parameters().map_err(|error| value_error(of_runtime(error)))?;
+    terms(lattice.sum_of_terms())
+}
+
+fn terms(found: Result<SumOfTerms, RuntimeError>) -> PyResult<Terms> {
+    let SumOfTerms { lagrangian, coordinates, parameters } = found.map_err(|error| value_error(of_runtime(error)))?;
+    Ok((lagrangian, coordinates, parameters.into_iter().collect()))
+}
+
+fn lattice(
+    (coordinates, site, bond): (Vec<String>, String, Option<String>),
+    sizes: Vec<usize>,
+    boundary: &str,
+    parameters: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Lattice> {
     let parameters = crate::system::values(parameters)?;
     let boundary: Boundary = boundary.parse().map_err(value_error)?;
-    let lattice = Lattice { coordinates, site, bond, sizes, boundary, parameters };
-    run(py, (request, watch), || lattice.system())
+    Ok(Lattice { coordinates, site, bond, sizes, boundary, parameters })
 }
 
 /// Runs a motion with the interpreter lock released.

@@ -84,6 +84,8 @@ WATCH = dict(
     callback_interval=Refused(-1.0, "`callback_interval` is -1.0"),
 )
 SOLVE = MOTION | ROWS | WATCH
+# What belongs to the system beside its Lagrangian.
+OF_SYSTEM = {name: ROWS[name] for name in ("H", "momenta", "action", "constraints", "friction")}
 # What a loss or a differentiable motion has no use for.
 NO_ROWS = {
     name: Refused(value, f"`{name}` cannot be given here")
@@ -104,6 +106,11 @@ ENSEMBLE = {name: of for name, of in MOTION.items() if name != "scales"} | dict(
     observe={"square": "x^2"},
     threads=Refused(0, "`threads` is 0"),
     progress=WATCH["progress"],
+    **OF_SYSTEM | dict(
+        H=Changed("p_x^2/2 + x^2", HAMILTONIAN | dict(p0=[[0.5], [0.0]])),
+        momenta=Refused(["p"], "unknown name `p_x`", HAMILTONIAN | dict(p0=[[0.5], [0.0]])),
+        constraints=Changed("x^2 + y^2 = 1", PENDULUM | dict(q0=[PENDULUM["q0"]], v0=[PENDULUM["v0"]])),
+    ),
 )
 TIMES = np.linspace(0.0, 3.0, 7)
 DATA = {"x": np.cos(TIMES) + 0.01 * np.sin(9.0 * TIMES)}
@@ -127,6 +134,10 @@ FIT = MOTION | dict(
     z0=Changed(0.7, dict(L="x'^2/2 - k*x^2/2 - z^2/10", parameters={"k": 1.0})),
     accuracy=Refused(-1.0, "error is -1; it must be positive"),
     events={"level": ("x - 0.5", [1.05])},
+    H=Changed("p_x^2/2 + k*x^2/2 + z/10", HAMILTONIAN | dict(H="p_x^2/2 + k*x^2/2 + z/5", parameters={"k": 1.0})),
+    momenta=Refused(["p"], "unknown name `p_x`", HAMILTONIAN),
+    action=OF_SYSTEM["action"],
+    friction={"x": 0.05},
     constraints=Changed("x^2 + y^2 = 1", PENDULUM | dict(L="(x'^2 + y'^2)/2 - k*y", parameters={"k": 9.81})),
     project=Refused(True, "the system has no constraints"),
 )
@@ -139,6 +150,7 @@ OF_EXACT = dict(
 LATTICE = dict(site="x'^2/2 + k*cos(x) + gamma*z", bond="-(xr - xl)^2/2", q0=[0.1, 0.3, 0.0, 0.2], v0=0.0, t=1.0, step=0.1,
                parameters=PARAMETERS)  # fmt: skip
 BODIES = dict(masses=[1.0, 0.5], q0=[[0.0, 0.0], [1.0, 0.0]], v0=[[0.0, 0.0], [0.0, 1.0]], t=1.0, step=0.1)
+NO_START = dict(q0=None, v0=None, t=None, step=None)
 OF_MANY = dict(
     q0=[0.2, 0.3, 0.0, 0.2],
     v0=0.1,
@@ -256,14 +268,18 @@ CASES = {
     "check": (
         hz.check,
         GIVEN | dict(t=1.0),
-        {name: of for name, of in MOTION.items() if name != "scales"}
+        {name: of for name, of in (MOTION | OF_SYSTEM).items() if name != "scales"}
         | dict(t=1.1, places=Changed(3, STEPS), events=Changed(BALL, RESET | dict(integrator="gauss_2", step=0.1))),
     ),
     "compare": (
         hz.compare,
         dict(GIVEN, t=0.2),
         {name: MOTION[name] for name in ("q0", "v0", "p0", "z0", "coordinates", "parameters", "rayleigh", "tables", "force")}
-        | dict(L="x'^2/2 - k*x^2/2 + gamma*z/2", t=0.3, breaks=[0.1], method=hz.method(trapezoidal, 1)),
+        | OF_SYSTEM
+        | dict(
+            L="x'^2/2 - k*x^2/2 + gamma*z/2", t=0.3, breaks=[0.1], method=hz.method(trapezoidal, 1),
+            constraints=Refused("x = y", "not computed with constraints", dict(PENDULUM)), friction={"x": 0.2},
+        ),
     ),
     "method": (run_by, dict(function=trapezoidal, order=1), dict(function=twice, order=2, name="other", symmetric=True)),
     "exponential": (hz.exponential, EXACT | dict(v0=[0.5]), OF_EXACT | dict(v0=[0.6])),
@@ -275,14 +291,19 @@ CASES = {
         OF_MANY
         | dict(
             site="x'^2/2 + 2*k*cos(x) + gamma*z", bond="-(xr - xl)^2", boundary="fixed", coordinates=Refused(["y"], "unknown name"),
-            parameters={"k": 2.0, "gamma": -0.1},
+            parameters={"k": 2.0, "gamma": -0.1}, sites=Changed(5, NO_START | dict(sites=4)),
         ),
     ),
     "bodies": (
         hz.bodies,
         BODIES,
         OF_MANY
-        | dict(masses=[1.0, 0.6], q0=[[0.0, 0.1], [1.0, 0.0]], G=2.0, gamma=-0.1, integrator="strang", p0=Changed(0.5, dict(v0=None, p0=0.1))),
+        | dict(masses=[1.0, 0.6], q0=[[0.0, 0.1], [1.0, 0.0]], G=2.0, gamma=-0.1, integrator="strang", p0=Changed(0.5, dict(v0=None, p0=0.1)), dimensions=Changed(3, NO_START | dict(dimensions=2))),
+    ),
+    "body": (
+        lambda **given: hz.solve(hz.body(**given), v0=BODY["omega"], t=1.0, integrator="gauss_4", step=0.1),
+        {name: x for name, x in BODY.items() if name not in ("omega", "t")},
+        {name: OF_BODY[name] for name in ("inertia", "mass", "centre", "gravity", "gamma")} | dict(torque=("0.1", "0", "0")),
     ),
     "rigid_body": (hz.rigid_body, BODY, OF_BODY | WATCH | dict(every=Changed(2, dict(integrator="gauss_4", step=0.1)), events=["tip_z"], sensitivity=True)),
     "rigid_body_between": (
@@ -316,7 +337,7 @@ CASES = {
     "Interrupted": (lambda solution: str(hz.Interrupted(solution)), dict(solution=hz.solve(**GIVEN)), dict(solution=hz.solve(**GIVEN | dict(t=2.0)))),
 }  # fmt: skip
 # Functions that other names of the table stand for, as what they return takes their arguments.
-WRAPPED = {"method": hz.method, "value_and_grad": hz.solve, "ensemble_value_and_grad": hz.ensemble}
+WRAPPED = {"body": hz.body, "method": hz.method, "value_and_grad": hz.solve, "ensemble_value_and_grad": hz.ensemble}
 
 # Rows for JAX and PyTorch, whose functions take arguments by `options`.
 DIFFERENTIABLE = dict(GIVEN, t=[0.0, 0.4, 1.0])
@@ -366,6 +387,12 @@ METHODS = {
         ),
     ),
     "SparseSolution": (hz.lattice(**LATTICE), dict(resume=RESUME, __getitem__=dict(name=(dict(name="q[0]"), dict(name="v[1]"))))),
+    "RigidBodySolution": (hz.rigid_body(**BODY, integrator="gauss_4", steps=500), dict(resume=RESUME, __call__=dict(t=(dict(t=0.5), dict(t=0.6))), __getitem__=dict(name=(dict(name="tip_z"), dict(name="z"))))),
+    "RigidBody": (hz.body((1, 2, 3)), dict(with_parameters=dict(parameters=(dict(parameters={"mass": 1.0}), dict(parameters={"mass": 2.0}))))),
+    "SparseSystem": (
+        hz.bodies([1.0, 0.5], dimensions=2),
+        dict(with_parameters=dict(parameters=(dict(parameters={"G": 1.0}), dict(parameters={"G": 2.0})))),
+    ),
     "Ensemble": (
         ENS,
         dict(

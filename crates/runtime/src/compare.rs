@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 /// Accuracies requested of the reference, tried in this order until one is accepted.
 const REFERENCES: [f64; 5] = [1e-13, 1e-12, 1e-10, 1e-8, 1e-6];
 
+/// The number of stages that stands for the contact Lobatto method of the highest order, 14.
+const MOST_STAGES_WITH_CONSTRAINTS: usize = 7;
+
 /// Time budget of all integrators together, shared equally, so that the comparison of a short motion is short.
 const BUDGET: Duration = Duration::from_millis(2000);
 
@@ -114,20 +117,23 @@ impl System {
     /// longer. The peers are run with a decreasing sequence of tolerances.
     ///
     /// # Errors
-    /// Those of the reference, which is contact Gauss collocation with 16 stages.
+    /// Those of the reference, which is contact Gauss collocation with 16 stages, or, under constraints, a contact Lobatto method
+    /// of order 14.
     pub fn compare(
         &self,
         motion: &Motion,
         peers: &[&dyn Peer],
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Comparison, RuntimeError> {
-        crate::kernel::refuse_constraints(self.formula(), "comparisons of integrators")?;
+        let is_held = self.formula().constraints() > 0;
         let without_output = |step_control: StepControl| Motion {
             action: false,
+            project: motion.project,
             interrupt: motion.interrupt.clone(),
             ..Motion::new(motion.start.clone(), motion.end, step_control)
         };
-        let by = AnyIntegrator::Gauss { stages: 16 };
+        // With constraints it stands for the contact Lobatto method of the same order.
+        let by = AnyIntegrator::Gauss { stages: if is_held { MOST_STAGES_WITH_CONSTRAINTS } else { 16 } };
         let mut count = Err(RuntimeError::from(InputError::NoSteps));
         for error in REFERENCES {
             let plan = self.plan(&without_output(StepControl::Accuracy { error, by: Some(by) }));
@@ -195,9 +201,12 @@ impl System {
             comparison.rows.extend(work_of(&measure, MAX_HALVINGS, &run, &error, MIN_RUNS));
         }
         // A first-order system has no resets.
-        let peers = if self.formula().resets() > 0 || self.formula().is_hamiltonian() {
-            let hamiltonian = self.formula().is_hamiltonian();
-            let why = if hamiltonian { "it has the equations of a Lagrangian only" } else { "it performs no resets" };
+        let peers = if self.formula().resets() > 0 || self.formula().is_hamiltonian() || is_held {
+            let why = match self.formula().is_hamiltonian() {
+                true => "it has the equations of a Lagrangian only",
+                false if is_held => "it has no constraints",
+                false => "it performs no resets",
+            };
             let why = why.to_owned();
             comparison.left_out.extend(peers.iter().map(|peer| (peer.name().to_owned(), why.clone())));
             &[]

@@ -68,7 +68,7 @@ pub use path::{BoundaryProblem, FoundPath};
 pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
 pub use sensitivity::{EventAt, Loss, LossGradient, Sensitivity};
-pub use sparse::{Bodies, Boundary, Lattice, SiteMotion, SiteSystem};
+pub use sparse::{Bodies, Boundary, Lattice, SiteMotion, SiteSystem, SumOfTerms};
 pub use symmetry::FormulaSymmetry;
 pub use system::System;
 

@@ -13,20 +13,20 @@ pub struct LyapunovExponents {
     pub t: f64,
     /// The steps taken.
     pub steps: usize,
-    /// The `2n + 1` exponents, in descending order.
+    /// The exponents, in descending order: `2n + 1`, or `2 (n - m) + 1` under m constraints.
     pub exponents: Vec<f64>,
     /// The same of the second half of the motion, in the same order.
     pub of_second_half: Vec<f64>,
     /// The exponents of n pairs of directions of the position and the momentum of a coordinate; with the rate they are
-    /// all exponents if `L_z` is constant.
+    /// all exponents if `L_z` is constant. Empty under constraints.
     pub pairs: Vec<[f64; 2]>,
     /// The mean of `ln(sigma_d)/h`, the rate of the conformal factor.
     pub rate: f64,
     /// The largest distance of the sum of a pair from the rate, where the two are equal but for round-off: for
-    /// constant `L_z`, without an applied force and without resets that are not contact.
+    /// constant `L_z`, without an applied force, constraints, and resets that are not contact.
     pub pairing_defect: Option<f64>,
     /// The distance of the sum of all exponents from `n + 1` times the rate, where the two are equal but for round-off:
-    /// without an applied force and without resets that are not contact.
+    /// without an applied force, constraints, and resets that are not contact.
     pub volume_defect: Option<f64>,
 }
 

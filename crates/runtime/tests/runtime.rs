@@ -20,3 +20,4 @@ mod rows_beside_kinks;
 mod sensitive;
 mod sensitivity;
 mod sparse;
+mod sums_of_terms;

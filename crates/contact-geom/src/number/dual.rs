@@ -315,7 +315,12 @@ macro_rules! arithmetic {
             }
             #[$inline]
             fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
-                self.re.piecewise(of).map(Self::constant)
+                let values = self.re.piecewise(of);
+                let mut constants = [Self::zero(); K];
+                for i in 0..K {
+                    constants[i] = Self::constant(values[i]);
+                }
+                constants
             }
             #[inline]
             fn apart<R>(work: impl FnOnce() -> R) -> R {

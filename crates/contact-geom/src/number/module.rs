@@ -22,6 +22,8 @@ pub trait TangentVector<T>: Copy + PartialEq + Debug + 'static {
     fn combined(self, a: T, other: Self, b: T) -> Self;
 }
 
+// Loops over indices: iterators are compiled once more for each type of differential, of which there are many.
+#[allow(clippy::needless_range_loop)]
 impl<T: Scalar, const N: usize> TangentVector<T> for SVector<T, N> {
     #[inline(always)]
     fn null() -> Self {
@@ -29,29 +31,33 @@ impl<T: Scalar, const N: usize> TangentVector<T> for SVector<T, N> {
     }
     #[inline(always)]
     fn each(mut self, mut f: impl FnMut(T) -> T) -> Self {
-        for a in self.data.0[0].iter_mut() {
-            *a = f(*a);
+        let mine = &mut self.data.0[0];
+        for i in 0..N {
+            mine[i] = f(mine[i]);
         }
         self
     }
     #[inline(always)]
     fn join(mut self, other: Self, mut f: impl FnMut(T, T) -> T) -> Self {
-        for (a, b) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
-            *a = f(*a, b);
+        let (mine, others) = (&mut self.data.0[0], &other.data.0[0]);
+        for i in 0..N {
+            mine[i] = f(mine[i], others[i]);
         }
         self
     }
     #[inline(always)]
     fn scaled(mut self, a: T) -> Self {
-        for x in self.data.0[0].iter_mut() {
-            *x *= a;
+        let mine = &mut self.data.0[0];
+        for i in 0..N {
+            mine[i] *= a;
         }
         self
     }
     #[inline(always)]
     fn combined(mut self, a: T, other: Self, b: T) -> Self {
-        for (x, y) in self.data.0[0].iter_mut().zip(other.data.0[0]) {
-            *x = *x * a + b * y;
+        let (mine, others) = (&mut self.data.0[0], &other.data.0[0]);
+        for i in 0..N {
+            mine[i] = mine[i] * a + b * others[i];
         }
         self
     }

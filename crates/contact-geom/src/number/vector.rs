@@ -6,10 +6,11 @@ use nalgebra::SVector;
 /// The vector whose components are the values of a function of the index; [`vector`](macro@crate::vector) calls it with a closure that
 /// is always inlined.
 #[inline(always)]
+#[allow(clippy::needless_range_loop, reason = "an iterator is compiled once more for each type of number")]
 pub fn vector_of<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<T, N> {
     let mut x = [T::zero(); N];
-    for (i, x) in x.iter_mut().enumerate() {
-        *x = of(i);
+    for i in 0..N {
+        x[i] = of(i);
     }
     x.into()
 }

@@ -6,6 +6,7 @@ use crate::sensitivity::SensitivityError;
 use crate::sensitivity::carried_columns::CarriedColumns;
 use crate::sensitivity::columns::Column;
 use crate::sensitivity::parametric_system::DifferentiableProblem;
+use crate::sensitivity::projected_start::ProjectedStart;
 use crate::sensitivity::row_times::RowTimes;
 use crate::sensitivity::step_maps::Direction;
 use crate::sensitivity::step_tangent::{StepTangent, TakenStep};
@@ -23,12 +24,16 @@ use std::ops::ControlFlow;
 ///
 /// The tangent is carried across kinks, jumps and impacts. Steps that meet an elastic impact have these sums up to their error,
 /// and those that meet another reset do not have them.
+///
+/// Under m constraints on positions there are `2 (n - m) + 1` exponents, of the directions that the constraints leave. They are
+/// measured by the lengths of these directions in all coordinates, so that their sums are those above in the limit of a long run
+/// alone, and there are no [`pairs`](Self::pairs).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LyapunovExponents {
     /// The outcome of the run. Where it ended early, the exponents are those of its whole steps; a run ends where its motion
     /// comes to rest.
     pub outcome: Outcome,
-    /// The `2n + 1` exponents, in descending order; NaN if no step was taken.
+    /// The exponents, in descending order, `2n + 1` without constraints; NaN if no step was taken.
     pub exponents: Vec<f64>,
     /// The same of the second half of the run, in the same order: its difference is an estimate of the error of a run
     /// of finite length, and it does not depend on the initial directions. The halves meet at the end of a step, or of a part
@@ -76,6 +81,24 @@ fn initial_frame(n: usize, dimension: usize) -> Vec<Column> {
     let positions = (0..n).map(|i| Column::new(unit(i), zero(), 0.0));
     let momenta = (0..n).rev().map(|i| Column::new(zero(), unit(i), 0.0));
     std::iter::once(Column::new(zero(), zero(), 1.0)).chain(positions).chain(momenta).collect()
+}
+
+/// An orthonormal basis of the directions that constraints leave, of this number, from those of all coordinates.
+fn tangent_frame(mut columns: Vec<Column>, start: &ProjectedStart, count: usize) -> Vec<Column> {
+    columns.iter_mut().for_each(|column| start.push(column));
+    let mut basis: Vec<Column> = Vec::with_capacity(count);
+    // The one with the largest part outside of the span of those before: the others are dependent.
+    while basis.len() < count {
+        let sizes = columns.iter().map(|column| column.dot(column));
+        let Some((i, size)) = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+        let mut next = columns.swap_remove(i);
+        next.scale(1.0 / size.sqrt());
+        for column in &mut columns {
+            column.add_multiple(-column.dot(&next), &next);
+        }
+        basis.push(next);
+    }
+    basis
 }
 
 impl Frame<'_, '_> {
@@ -176,13 +199,20 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
         }
         let run = self.differentiable()?.with_conformal_factor();
         let plan = run.plan(until)?;
-        if plan.steps.info.constrained {
-            // Of the 2n + 1 directions of the frame only those that are tangent to the constraints are of the motion.
+        let of_start = ProjectedStart::of(&problem, &plan.steps);
+        let of_start = of_start.map_err(|cause| SensitivityError::Step { step: 0, cause })?;
+        if plan.steps.info.constrained && of_start.is_none() {
+            // Of constraints on velocities the directions of the motion are not known.
             let method = plan.steps.info.name.clone();
             return Err(SensitivityError::UnderConstraints { method, what: "Lyapunov exponents" });
         }
         let engine = StepTangent::new(&problem, &plan.steps, Direction::Forward)?;
-        let columns = initial_frame(coordinates, dimension);
+        let mut columns = initial_frame(coordinates, dimension);
+        let is_held = of_start.is_some();
+        if let Some(start) = of_start {
+            let count = columns.len().saturating_sub(2 * start.constraints());
+            columns = tangent_frame(columns, &start, count);
+        }
         let t0 = problem.problem.t0;
         let span = (t0, plan.steps.t_end);
         let stretching = Stretching::new(columns.len(), span);
@@ -208,7 +238,7 @@ impl<'p, P: DifferentiableProblem<'p>> Run<'p, '_, P> {
             .map(|(whole, first)| [whole / (t - t0), (whole - first) / (t - t_middle)])
             .collect();
         // The frame has the pair of a direction of q in the reverse order, after that of z.
-        let paired = all.iter().skip(1).zip(all.iter().rev()).take(coordinates);
+        let paired = all.iter().skip(1).zip(all.iter().rev()).take(if is_held { 0 } else { coordinates });
         let pairs = paired.map(|(of_q, of_p)| [of_q[0], of_p[0]]).collect();
         let all = sorted(&all, |pair| pair[0], true);
         let rate = outcome.log_factor.map_or(f64::NAN, |factor| factor / (t - t0));

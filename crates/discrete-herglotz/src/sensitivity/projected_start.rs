@@ -33,6 +33,11 @@ impl ProjectedStart {
         Ok(Some(ProjectedStart { projection, of_velocity, qv, vv }))
     }
 
+    /// The number of constraints.
+    pub fn constraints(&self) -> usize {
+        self.projection.jacobian.nrows()
+    }
+
     /// Projects the tangent of a start.
     pub fn push(&self, column: &mut Column) {
         let StartProjection { response, jacobian, curvature, parameters } = &self.projection;

@@ -3,6 +3,7 @@
 use super::fit_table::FitTable;
 use super::location::{Location, Named, Numbers, Span};
 use super::quantities::Quantities;
+use super::sum_of_terms::{BodiesTerms, LatticeTerms};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
@@ -84,7 +85,7 @@ impl FrictionTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(
     deny_unknown_fields,
-    expecting = "a table with `coordinates` and `lagrangian` or `hamiltonian`, or with `catalogue`"
+    expecting = "a table with `coordinates` and `lagrangian` or `hamiltonian`, or with `catalogue`, `lattice` or `bodies`"
 )]
 pub(crate) struct SystemTable {
     /// The name of a system of the catalogue; see `herglotz list systems`.
@@ -105,6 +106,11 @@ pub(crate) struct SystemTable {
     /// expressions that vanish. The motion is then that on the surface where they hold. `gauss_4` means a contact Lobatto
     /// method of the same order, and a splitting means RATTLE that is composed by its scheme.
     pub constraints: Option<Location<Vec<Location<String>>>>,
+    /// In place of L, a lattice of up to 256 coordinates. `coordinates` are then the components at a site, by default `x`; in all
+    /// other formulas they are `x[0]`, `x[1]` and so on, or with several components `x_0`, `y_0`, `x_1` and so on.
+    pub lattice: Option<Location<LatticeTerms>>,
+    /// In place of L, bodies with Newtonian gravitation.
+    pub bodies: Option<Location<BodiesTerms>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,

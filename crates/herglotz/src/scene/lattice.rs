@@ -6,6 +6,7 @@ use super::file::{RowsTable, RunTable, span_of_table};
 use super::location::{Location, Named, Span};
 use super::output::{RowTimes, of_formula};
 use super::step_control::step_control;
+use super::sum_of_terms::explain;
 use crate::runtime::{
     AnyIntegrator, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError, SiteMotion, SiteSystem,
     Start, StepControl, Steps, velocity_name,
@@ -66,6 +67,16 @@ pub(crate) enum Sizes {
     Many(Vec<usize>),
 }
 
+impl Sizes {
+    /// The number along each direction.
+    pub fn to_vec(&self) -> Vec<usize> {
+        match self {
+            Sizes::One(sites) => vec![*sites],
+            Sizes::Many(sizes) => sizes.clone(),
+        }
+    }
+}
+
 /// The boundary condition of a lattice.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -77,6 +88,16 @@ pub(crate) enum BoundaryName {
     Fixed,
     /// No bonds beyond the ends.
     Free,
+}
+
+impl From<BoundaryName> for Boundary {
+    fn from(name: BoundaryName) -> Self {
+        match name {
+            BoundaryName::Periodic => Boundary::Periodic,
+            BoundaryName::Fixed => Boundary::Fixed,
+            BoundaryName::Free => Boundary::Free,
+        }
+    }
 }
 
 /// The values at all sites.
@@ -157,10 +178,7 @@ impl LatticeScene {
         for (name, value) in &table.parameters.0 {
             finite(text, value, name)?;
         }
-        let sizes = match &*table.sites {
-            Sizes::One(sites) => vec![*sites],
-            Sizes::Many(sizes) => sizes.clone(),
-        };
+        let sizes = table.sites.to_vec();
         let count = sizes.iter().try_fold(1usize, |product, size| product.checked_mul(*size));
         if count.is_none_or(|count| count > MAX_SITES) {
             let message = format!(
@@ -175,11 +193,7 @@ impl LatticeScene {
             site: (*table.site).clone(),
             bond: table.bond.as_ref().map(|bond| (**bond).clone()),
             sizes: sizes.clone(),
-            boundary: match table.boundary {
-                BoundaryName::Periodic => Boundary::Periodic,
-                BoundaryName::Fixed => Boundary::Fixed,
-                BoundaryName::Free => Boundary::Free,
-            },
+            boundary: table.boundary.into(),
             parameters: parameters.clone(),
         };
         let names = table.coordinates.as_ref().map_or(table.span(), Location::span);
@@ -192,7 +206,7 @@ impl LatticeScene {
             ("parameters", parameters_at),
             ("integrator", run.integrator.as_ref().map_or(run.span(), Location::span)),
         ];
-        let explain = |error: RuntimeError| explain(text, &spans, table.span(), &error);
+        let explain = |error: RuntimeError| explain(text, &spans, table.span(), "[lattice]", &error);
         let system = lattice.system().map_err(explain)?;
         let start = read_start(text, start, &coordinates, &sizes, &parameters)?;
         let end = finite(text, &run.time, "time")?;
@@ -211,7 +225,7 @@ impl LatticeScene {
 
     /// The error with the position in the file that it concerns.
     pub fn explain(&self, error: &RuntimeError) -> SceneError {
-        explain(&self.text, &self.spans, self.run, error)
+        explain(&self.text, &self.spans, self.run, "[lattice]", error)
     }
 
     /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; with two
@@ -235,25 +249,6 @@ impl LatticeScene {
         };
         let state = kinds.into_iter().flat_map(of_kind);
         ["t".to_owned()].into_iter().chain(state).chain(["z", "energy"].map(str::to_owned)).collect()
-    }
-}
-
-/// The error with the position of the argument that it names.
-fn explain(text: &str, spans: &[(&'static str, Span)], otherwise: Span, error: &RuntimeError) -> SceneError {
-    let place = |name: &str| spans.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, span)| *span);
-    match error {
-        RuntimeError::Part { part, error } => match &**error {
-            FormulaError::Parse(error) => {
-                let mut error = error.clone();
-                if error.message.starts_with("unknown name") && error.nearest.is_none() {
-                    error.message += "; a parameter needs a value in `parameters` of [lattice]";
-                }
-                SceneError::in_string(text, place(part), &error)
-            }
-            error => SceneError::at(text, place(part), error.to_string()),
-        },
-        RuntimeError::Argument { argument, .. } => SceneError::at(text, place(argument), error.to_string()),
-        error => SceneError::at(text, otherwise, error.to_string()),
     }
 }
 

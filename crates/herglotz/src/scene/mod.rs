@@ -24,6 +24,7 @@ mod quantities;
 mod resets;
 mod start;
 mod step_control;
+mod sum_of_terms;
 mod sweep;
 mod system;
 mod tables;

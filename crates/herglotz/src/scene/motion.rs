@@ -12,7 +12,7 @@ use super::resets::with_resets;
 use super::step_control::step_control;
 use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
-use super::{SceneError, overrides, start, tables};
+use super::{SceneError, overrides, start, sum_of_terms, tables};
 use crate::runtime::{
     AfterReset, Column, Crossing, Event, InputError, Motion, MotionFit, RuntimeError, SelectionFailure, Start,
     StepControl, StepError, System, Table, in_words, velocity_name,
@@ -111,8 +111,8 @@ impl Scene {
     pub fn read_in(text: &str, changes: &[String], folder: &Path) -> Result<Self, SceneError> {
         check_version(text)?;
         if let Some(lattice) = file::span_of_table(text, "lattice") {
-            let message = "a lattice works only with `herglotz run`; the other commands are for systems of up to 16 \
-                           coordinates";
+            let message = "a lattice works only with `herglotz run`; for the other commands, and up to 256 coordinates, give it as \
+                           [system.lattice]";
             return Err(SceneError::at(text, lattice, message));
         }
         if let Some(body) = file::span_of_table(text, "body") {
@@ -182,9 +182,10 @@ impl Scene {
             system: runs,
             expressions: expressions(&file).cloned().collect(),
             additions: additions(&file, &tables),
-            lagrangian: match (entry, source) {
-                (Some(entry), _) => entry.lagrangian.to_owned(),
-                (None, own) => own.map(|text| (**text).clone()).unwrap_or_default(),
+            lagrangian: match (entry, source, sum_of_terms::read(text, system)?) {
+                (Some(entry), ..) => entry.lagrangian.to_owned(),
+                (None, Some(own), _) => (**own).clone(),
+                (None, None, terms) => terms.map(|terms| terms.lagrangian).unwrap_or_default(),
             },
             start,
             end,

@@ -4,6 +4,7 @@ use super::SceneError;
 use super::checked::finite;
 use super::file::SystemTable;
 use super::location::Location;
+use super::sum_of_terms;
 use crate::runtime::{CatalogueEntry, Formula, FormulaError, FormulaNames, RuntimeError, Table, check_parameters};
 
 /// The entry of the catalogue that a scene names.
@@ -17,6 +18,23 @@ pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option
     }
     if let (Some(_), Some(action)) = (&system.catalogue, &system.action) {
         return refuse(action.span(), "the action of a system of the catalogue is `z`; remove `action`");
+    }
+    let own = system.lagrangian.as_ref().or(system.hamiltonian.as_ref()).or(system.catalogue.as_ref());
+    let of_terms = system.lattice.as_ref().map(Location::span).or(system.bodies.as_ref().map(Location::span));
+    match (of_terms, own, &system.lattice, &system.bodies) {
+        (Some(_), Some(other), ..) => {
+            return refuse(other.span(), "give this or a `lattice` or `bodies`, not both");
+        }
+        (Some(_), None, Some(_), Some(bodies)) => {
+            return refuse(bodies.span(), "give a `lattice` or `bodies`, not both");
+        }
+        (Some(_), None, ..) => {
+            if let Some(action) = &system.action {
+                return refuse(action.span(), "the action of a lattice and of bodies is `z`; remove `action`");
+            }
+            return Ok(None);
+        }
+        (None, ..) => {}
     }
     match (&system.catalogue, &system.coordinates, system.lagrangian.as_ref().or(system.hamiltonian.as_ref())) {
         (Some(name), None, None) => match CatalogueEntry::find(name) {
@@ -48,6 +66,13 @@ pub(super) fn formula(
     }
     let of_tables = || tables.iter().map(|(name, _)| name);
     let at_system = |error: FormulaError| SceneError::at(text, system.span(), error.to_string());
+    if let Some(terms) = sum_of_terms::read(text, system)? {
+        let coordinates: Vec<&str> = terms.coordinates.iter().map(String::as_str).collect();
+        let parameters: Vec<(&str, f64)> = terms.parameters.iter().map(|(name, x)| (name.as_str(), *x)).collect();
+        let tables: Vec<(&str, Table)> = tables.iter().map(|(name, table)| (name.as_str(), table.clone())).collect();
+        let names = FormulaNames { tables: &tables, ..FormulaNames::new(&coordinates, &parameters) };
+        return Formula::parse_lagrangian(&terms.lagrangian, &names).map_err(at_system);
+    }
     let Some(entry) = entry else {
         let source = system.lagrangian.as_ref().or(system.hamiltonian.as_ref());
         let (Some(coordinates), Some(source)) = (&system.coordinates, source) else {

@@ -31,8 +31,8 @@ __version__ = "0.1.0"
 
 # Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
-    "_body": "RigidBodyDerivatives RigidBodySolution RigidBodyStates rigid_bodies rigid_body rigid_body_between",
-    "_sparse": "SparseSolution bodies lattice",
+    "_body": "RigidBody RigidBodyDerivatives RigidBodySolution RigidBodyStates body rigid_bodies rigid_body rigid_body_between",
+    "_sparse": "SparseSolution SparseSystem bodies lattice",
     "_ensemble": "Ensemble MemberCrossings MemberResets ensemble",
     "_exact": "DiscreteLagrangian Exponential Retraction exact_lagrangian exponential retract",
     "_fit": "Fit fit",
@@ -69,6 +69,7 @@ def catalogue():
 
 __all__ = [
     "SparseSolution",
+    "SparseSystem",
     "Check",
     "Comparison",
     "Contact",
@@ -93,6 +94,7 @@ __all__ = [
     "Plan",
     "Resets",
     "Retraction",
+    "RigidBody",
     "RigidBodyDerivatives",
     "RigidBodySolution",
     "RigidBodyStates",
@@ -103,6 +105,7 @@ __all__ = [
     "Table",
     "array",
     "bodies",
+    "body",
     "catalogue",
     "check",
     "compare",

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Vector: TypeAlias = NDArray[np.float64]
 # A function (t, q, v, z, **parameters), a formula, the name of a system, a SymPy expression, or a system.
-Lagrangian: TypeAlias = Callable[..., Any] | str | System | Any
+Lagrangian: TypeAlias = Callable[..., Any] | str | System | SparseSystem | RigidBody | Any
 Expression: TypeAlias = str | Callable[..., Any]
 Direction: TypeAlias = Literal["both", "rising", "falling"]
 Pieces: TypeAlias = Literal["linear", "held", "cubic"]
@@ -316,6 +316,14 @@ class Path:
     def plot(self, *names: str, ax: Any = None) -> Any: ...
     def __bool__(self) -> bool: ...
 
+class SparseSystem:
+    dimension: int
+    shape: tuple[int, ...]
+    parameters: dict[str, float]
+    @property
+    def system(self) -> System: ...
+    def with_parameters(self, parameters: Mapping[str, float]) -> SparseSystem: ...
+
 class SparseSolution:
     t: Vector
     q: Vector
@@ -370,6 +378,9 @@ class RigidBodyDerivatives:
     log_factor: float
     contact_defect: float
 
+class RigidBody:
+    def with_parameters(self, parameters: Mapping[str, Any]) -> RigidBody: ...
+
 class RigidBodySolution(RigidBodyStates):
     end: RigidBodyStates
     events: list[RigidBodyStates]
@@ -382,6 +393,17 @@ class RigidBodySolution(RigidBodyStates):
     derivatives: RigidBodyDerivatives | None
     @property
     def t_end(self) -> float: ...
+    @property
+    def plan(self) -> Plan: ...
+    def __call__(self, t: ArrayLike) -> RigidBodyStates: ...
+    def resume(
+        self,
+        t: ArrayLike | None = None,
+        *,
+        progress: bool = False,
+        callback: Callable[[RigidBodySolution], Any] | None = None,
+        callback_interval: float = 1.0,
+    ) -> RigidBodySolution: ...
 
 class Interrupted(KeyboardInterrupt):
     solution: Solution | SparseSolution | RigidBodySolution | Ensemble
@@ -560,6 +582,7 @@ def lattice(
     *,
     p0: ArrayLike | None = None,
     z0: float = 0.0,
+    sites: int | Sequence[int] | None = None,
     boundary: Literal["periodic", "fixed", "free"] = "periodic",
     integrator: str = "strang",
     step: float | None = None,
@@ -571,14 +594,15 @@ def lattice(
     progress: bool = False,
     callback: Callable[[SparseSolution], Any] | None = None,
     callback_interval: float = 1.0,
-) -> SparseSolution: ...
+) -> Any: ...
 def bodies(
     masses: ArrayLike,
-    q0: ArrayLike,
+    q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     t: ArrayLike | None = None,
     *,
     p0: ArrayLike | None = None,
+    dimensions: Literal[2, 3] | None = None,
     G: float = 1.0,
     gamma: float = 0.0,
     z0: float = 0.0,
@@ -590,7 +614,16 @@ def bodies(
     progress: bool = False,
     callback: Callable[[SparseSolution], Any] | None = None,
     callback_interval: float = 1.0,
-) -> SparseSolution: ...
+) -> Any: ...
+def body(
+    inertia: ArrayLike,
+    *,
+    mass: float = 0.0,
+    centre: ArrayLike = (0.0, 0.0, 0.0),
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    gamma: float = 0.0,
+    torque: Sequence[str | float] | None = None,
+) -> RigidBody: ...
 def rigid_body(
     inertia: ArrayLike,
     *,
@@ -650,11 +683,12 @@ def rigid_bodies(
     threads: int | None = None,
 ) -> list[RigidBodySolution]: ...
 def ensemble(
-    L: Lagrangian,
-    q0: ArrayLike,
+    L: Lagrangian | None = None,
+    q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     t: ArrayLike | None = None,
     *,
+    H: Expression | None = None,
     p0: ArrayLike | None = None,
     z0: ArrayLike = 0.0,
     accuracy: float | None = None,
@@ -670,6 +704,9 @@ def ensemble(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
+    constraints: Constraints | None = None,
     progress: bool = False,
 ) -> Ensemble: ...
 @overload
@@ -705,7 +742,7 @@ def geometry(
 def value_and_grad(loss: Expression) -> Callable[..., tuple[float, Gradient]]: ...
 def ensemble_value_and_grad(loss: Expression) -> Callable[..., tuple[Vector, EnsembleGradient]]: ...
 def fit(
-    L: Lagrangian,
+    L: Lagrangian | None = None,
     q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     t: ArrayLike | None = None,
@@ -721,6 +758,7 @@ def fit(
     nodes: ArrayLike = (),
     starts: Sequence[Mapping[str, float]] = (),
     max_evaluations: int | None = None,
+    H: Expression | None = None,
     p0: ArrayLike | None = None,
     z0: float = 0.0,
     accuracy: float | None = None,
@@ -734,7 +772,10 @@ def fit(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
     constraints: Constraints | None = None,
+    friction: Friction | None = None,
     project: bool = False,
 ) -> Fit: ...
 def path(
@@ -763,11 +804,12 @@ def method(
     function: Callable[..., Any], order: int, *, name: str | None = None, symmetric: bool = False
 ) -> Method: ...
 def check(
-    L: Lagrangian,
+    L: Lagrangian | None = None,
     q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     t: ArrayLike | None = None,
     *,
+    H: Expression | None = None,
     p0: ArrayLike | None = None,
     z0: float = 0.0,
     places: int = 10,
@@ -782,13 +824,17 @@ def check(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
+    constraints: Constraints | None = None,
 ) -> Check: ...
 def compare(
-    L: Lagrangian,
+    L: Lagrangian | None = None,
     q0: ArrayLike | None = None,
     v0: ArrayLike | None = None,
     t: ArrayLike | None = None,
     *,
+    H: Expression | None = None,
     p0: ArrayLike | None = None,
     z0: float = 0.0,
     method: Method | None = None,
@@ -798,6 +844,10 @@ def compare(
     rayleigh: Expression | None = None,
     tables: Mapping[str, Table] | None = None,
     breaks: Sequence[float] | None = None,
+    momenta: Sequence[str] | str | None = None,
+    action: str | None = None,
+    constraints: Constraints | None = None,
+    friction: Friction | None = None,
 ) -> Comparison: ...
 def table(t: ArrayLike, y: ArrayLike, pieces: Pieces = "linear") -> Table: ...
 def where(condition: Any, x: Any, y: Any) -> Any: ...

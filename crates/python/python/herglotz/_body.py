@@ -4,9 +4,9 @@ import numpy as np
 
 from . import _core
 from ._events import Event
-from ._rows import Rows
-from ._solution import Interrupted
-from ._system import copied, warn_of_positive
+from ._rows import Rows, times_after
+from ._solution import Interrupted, Plan
+from ._system import Composed, copied, is_absent, warn_of_positive
 from ._watch import NOTHING, Watch
 
 # The columns of a row of the core, in their order, and the arrays that they are parts of.
@@ -94,8 +94,119 @@ class RigidBodyDerivatives:
         self.log_factor, self.contact_defect = log_factor, contact_defect
 
 
+class RigidBody(Composed):
+    """A rigid body about a fixed point, for `solve`, `check` and `ensemble`; made by `body`.
+
+    Attributes
+    ----------
+    parameters : dict
+        The arguments of `body`, by name.
+
+    Notes
+    -----
+    In the arguments of these functions `q0` is the attitude, a unit quaternion (w, x, y, z) that takes the body to space, by default the
+    identity, `v0` the angular velocity in the body, and `p0` the momentum there. They return a `RigidBodySolution` and its like.
+    """
+
+    def __init__(self, given):
+        self._given = self.parameters = given
+
+    @property
+    def system(self):
+        """There is none: its configurations are rotations, and not the coordinates of a formula."""
+        raise ValueError(
+            "a rigid body is not a formula, since its configurations are rotations: it has motions by `solve`, `check` and "
+            "`ensemble`, and derivatives by `rigid_body(..., sensitivity=True)`"
+        )
+
+    def with_parameters(self, parameters):
+        """The body with other values of arguments of `body`."""
+        unknown = [name for name in parameters if name not in self._given]
+        if unknown:
+            raise ValueError(f"the parameter {unknown[0]!r} is not one of a rigid body: it has {', '.join(self._given)}")
+        return RigidBody(self._given | dict(parameters))
+
+    def _solve(self, arguments):
+        """The motion for the arguments of `solve`."""
+        return rigid_body(**self._of(arguments, {"accuracy", "integrator", "step", "steps", "every", "events", *_WATCHED}))
+
+    def _check(self, arguments):
+        """The check for the arguments of `check`."""
+        places, given = arguments.pop("places"), self._of(arguments, {"accuracy", "integrator", "step", "steps"})
+        way = tuple(given.pop(name, None) for name in ("accuracy", "integrator", "step", "steps"))
+        t = given.pop("t")
+        return _core.check_rigid_body(*_request(**given), copied(t), way, places)
+
+    def _ensemble(self, arguments):
+        """The motions for the arguments of `ensemble`."""
+        return rigid_bodies(**self._of(arguments, {"accuracy", "integrator", "step", "steps", "threads"}))
+
+    def _path(self, arguments):
+        """The motion between two attitudes for the arguments of `path`."""
+        start, to = (_array(name, arguments.pop(name)) for name in ("q0", "q1"))
+        t, guess = np.atleast_1d(np.asarray(arguments["t"], dtype=float)), arguments.pop("guess")
+        given = self._of(arguments | {"v0": (0.0, 0.0, 0.0) if guess is None else guess}, {"steps", "integrator"})
+        if guess is None and start.shape == to.shape == (4,):
+            given["omega"] = _turn(start, to) / (t[-1] - (t[0] if len(t) > 1 else 0.0))
+        return rigid_body_between(**given | {"attitude": start, "to": to})
+
+    def _of(self, arguments, known):
+        """The arguments of `rigid_body` and its like."""
+        arguments = {name: x for name, x in arguments.items() if name == "t" or name != "L" and not is_absent(x)}
+        given = dict(self.with_parameters(arguments.pop("parameters", {}))._given)
+        for name in arguments:
+            if name not in known and name not in ("q0", "v0", "p0", "z0", "t"):
+                raise ValueError(f"`{name}` is not there for rigid bodies: remove it")
+        attitude, omega, momentum = (arguments.pop(name, None) for name in ("q0", "v0", "p0"))
+        if (omega is None) == (momentum is None):
+            raise ValueError("give either `v0`, the angular velocity in the body, or `p0`, the momentum")
+        if arguments["t"] is None:
+            raise ValueError("`t` is not given: give the final time, or the times of the rows")
+        given["omega"] = omega if momentum is None else self._velocity(momentum)
+        return given | arguments | {"attitude": (1.0, 0.0, 0.0, 0.0) if attitude is None else attitude}
+
+    def _velocity(self, momentum):
+        """The angular velocity of a momentum, by the inertia about the fixed point."""
+        inertia, centre = _array("inertia", self._given["inertia"]), _array("centre", self._given["centre"])
+        inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
+        inertia = inertia + self._given["mass"] * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        return np.linalg.solve(inertia, _array("p0", momentum).T).T
+
+    def __repr__(self):
+        return f"<RigidBody: inertia {np.asarray(self._given['inertia']).tolist()}>"
+
+
+def _turn(start, to):
+    """The shortest turn from one attitude to another, in the body, as a vector."""
+    w, u = start[0], start[1:]
+    real, imaginary = w * to[0] + u @ to[1:], w * to[1:] - to[0] * u - np.cross(u, to[1:])
+    size = np.linalg.norm(imaginary)
+    angle = 2.0 * np.arctan2(size, abs(real))
+    return imaginary * (np.copysign(angle, real) / size if size > 0.0 else 2.0)
+
+
+_WATCHED = "progress", "callback", "callback_interval"
+
+
+def body(inertia, *, mass=0.0, centre=(0.0, 0.0, 0.0), gravity=(0.0, 0.0, 0.0), gamma=0.0, torque=None):
+    """A rigid body about a fixed point, for `solve`, `check` and `ensemble`; the arguments are those of `rigid_body`.
+
+    Returns
+    -------
+    RigidBody
+
+    Examples
+    --------
+    >>> import herglotz as hz
+    >>> sol = hz.solve(hz.body((1, 2, 3), gamma=-0.1), v0=(1, 1/2, 1/3), t=10.0)
+    >>> sol.status
+    'completed'
+    """
+    return RigidBody(dict(inertia=inertia, mass=mass, centre=centre, gravity=gravity, gamma=gamma, torque=torque))
+
+
 class RigidBodySolution(RigidBodyStates):
-    """A motion of a rigid body with k rows; made by `rigid_body`.
+    """A motion of a rigid body with k rows; made by `rigid_body` and by `solve`.
 
     It has the arrays of `RigidBodyStates`.
 
@@ -118,8 +229,9 @@ class RigidBodySolution(RigidBodyStates):
         The derivatives of the end, where they were requested and the run was completed.
     """
 
-    def __init__(self, record, events=0):
+    def __init__(self, record, events=0, request=None):
         super().__init__(record.rows)
+        self._request, self._plan = request, None
         self.end = RigidBodyStates(record.end[np.newaxis])
         of = [[row for event, row in record.crossings if event == k] for k in range(events)]
         self.events = [RigidBodyStates(np.array(rows, dtype=float).reshape(-1, 19)) for rows in of]
@@ -131,6 +243,66 @@ class RigidBodySolution(RigidBodyStates):
     def t_end(self):
         """The time that was reached."""
         return float(self.end.t[0])
+
+    @property
+    def plan(self):
+        """The plan: what was computed and what was skipped; ``print(sol.plan)``."""
+        if self._plan is None:
+            self._plan = Plan(*_core.plan_rigid_body(*self._request[:-1]))
+        return self._plan
+
+    def _way(self):
+        """The steps that were taken."""
+        way = self._request[4]
+        return way if way[0] is None and way[1] is not None else (None, self.integrator, abs(self.step_size), None)
+
+    def __call__(self, t):
+        """The states at other times of the motion, each by a shorter step of the integrator; the motion is run again.
+
+        Parameters
+        ----------
+        t : float or array of shape (k,)
+
+        Returns
+        -------
+        RigidBodyStates
+        """
+        body, start, asked, _, _, _, _ = self._request
+        times = np.array(t, dtype=float, ndmin=1)
+        asked = np.atleast_1d(np.asarray(asked, dtype=float))
+        first, last = asked[0] if len(asked) > 1 else 0.0, self.t_end
+        outside = [x for x in times.ravel() if not min(first, last) <= x <= max(first, last)]
+        if outside:
+            raise ValueError(f"t = {outside[0]} is not in the motion, which is from {first} to {last}")
+        order = np.unique(np.concatenate([times.ravel(), [first, last]]))
+        order = order if last >= first else order[::-1]
+        found = _core.run_rigid_body(body, start, order, None, self._way(), [], False, None)
+        at = {x: row for x, row in zip(order, found.rows)}
+        return RigidBodyStates(np.array([at[x] for x in times.ravel()]))
+
+    def resume(self, t=None, *, progress=False, callback=None, callback_interval=1.0):
+        """Continues from the end of the motion, with the same integrator and steps of the same length.
+
+        Parameters
+        ----------
+        t : float or array, optional
+            The new final time; or the times of the rows, beyond the end of this motion, the first of which may be that end. By
+            default the requested times that were not reached.
+        progress, callback, callback_interval
+            As in `solve`.
+
+        Returns
+        -------
+        RigidBodySolution
+            The motion from the end of this one.
+        """
+        watch = Watch(progress, callback, callback_interval)
+        body, _, asked, every, _, events, _ = self._request
+        times = times_after(asked, self.t_end, t)
+        end = self.end
+        start = end.attitude[0], end.omega[0], float(end.z[0])
+        way = None, self.integrator, abs(self.step_size), None
+        return _solution((body, start, times, every, way, events, False), watch)
 
     def __repr__(self):
         return f"<RigidBodySolution: {len(self.t)} rows, t = {self.t_end}, {self.steps} steps, {self.status}>"
@@ -245,7 +417,7 @@ def _solution(request, watch=NOTHING):
     """The solution of a request, unless a signal ended the run."""
 
     def solution(record):
-        return RigidBodySolution(record, len(request[5]))
+        return RigidBodySolution(record, len(request[5]), request)
 
     record = watch.run(lambda watched: _core.run_rigid_body(*request, watched), solution)
     sol = solution(record)
@@ -396,8 +568,11 @@ def rigid_bodies(
     for k in range(count):
         of = {name: x[k] if name in counts else x for name, x in arrays.items()}
         members.append(_request(torque=torque, **of))
-    records = _core.run_rigid_bodies(members, copied(t), (accuracy, integrator, step, steps), threads)
-    return [RigidBodySolution(record) for record in records]
+    t, way = copied(t), (accuracy, integrator, step, steps)
+    records = _core.run_rigid_bodies(members, t, way, threads)
+    return [
+        RigidBodySolution(record, request=(*member, t, None, way, [], False)) for member, record in zip(members, records)
+    ]
 
 
 def _request(inertia, mass, centre, gravity, gamma, torque, attitude, omega, z0):

@@ -9,7 +9,7 @@ from ._additions import breaks_of
 from ._events import events_of, texts_of_events
 from ._method import integrator_of
 from ._solve import functions_of, system_and_start
-from ._system import check_used, system_of, with_tables
+from ._system import Composed, check_used, system_of, with_tables
 
 
 class Geometry(NamedTuple):
@@ -180,10 +180,10 @@ class Check(NamedTuple):
         return "\n".join([first, *(f"  {loss}" for loss in self.losses)])
 
 
-def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events=()):
-    force, rayleigh, tables, breaks = more
-    given = L, *functions_of(force, rayleigh)
-    L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more)
+def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, kind, events=()):
+    force, rayleigh, tables, breaks, *_ = more
+    given = L if kind[0] is None else kind[0], *functions_of(force, rayleigh)
+    L, q0, v0 = system_and_start(L, q0, v0, p0, coordinates, parameters, more, kind)
     if (v0 is None) == (p0 is None):
         raise ValueError("give either `v0` or `p0`")
     start = (q0, v0, False, z0, None) if p0 is None else (q0, p0, True, z0, None)
@@ -201,11 +201,12 @@ def _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events=())
 
 
 def check(
-    L,
+    L=None,
     q0=None,
     v0=None,
     t=None,
     *,
+    H=None,
     p0=None,
     z0=0.0,
     places=10,
@@ -220,6 +221,9 @@ def check(
     rayleigh=None,
     tables=None,
     breaks=None,
+    momenta=None,
+    action=None,
+    constraints=None,
 ):
     """Whether the steps of a motion are contact: sigma, defects and momenta at some places, and the discrete theorems.
 
@@ -231,12 +235,19 @@ def check(
     -------
     Check
     """
+    arguments = locals()
+    if isinstance(L, Composed) and hasattr(L, "_check"):
+        return _check(L._check(arguments), [])
     way = accuracy, integrator, step, steps
-    more = force, rayleigh, tables, breaks
-    of, motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, events)
-    integrator, step, found, statements, contact, reason = _core.check(motion, places)
-    losses = of.losses or ([reason] if reason else [])
-    return Check(contact, integrator, step, [Place(*place) for place in found], statements, losses)
+    more, kind = (force, rayleigh, tables, breaks, constraints, None), (H, momenta, action)
+    of, motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, kind, events)
+    return _check(_core.check(motion, places), of.losses)
+
+
+def _check(found, losses):
+    integrator, step, places, statements, contact, reason = found
+    losses = losses or ([reason] if reason else [])
+    return Check(contact, integrator, step, [Place(*place) for place in places], statements, losses)
 
 
 class Work(NamedTuple):
@@ -283,11 +294,12 @@ class Comparison:
 
 
 def compare(
-    L,
+    L=None,
     q0=None,
     v0=None,
     t=None,
     *,
+    H=None,
     p0=None,
     z0=0.0,
     method=None,
@@ -297,6 +309,10 @@ def compare(
     rayleigh=None,
     tables=None,
     breaks=None,
+    momenta=None,
+    action=None,
+    constraints=None,
+    friction=None,
 ):
     """Run time against error for all integrators that apply to a motion; the arguments are those of `solve`.
 
@@ -306,6 +322,7 @@ def compare(
     -------
     Comparison
     """
-    more = force, rayleigh, tables, breaks
-    of, motion = _motion(L, q0, v0, t, p0, z0, (None, method, *((None, None) if method is None else (1.0, None))), coordinates, parameters, more)
+    more, kind = (force, rayleigh, tables, breaks, constraints, friction), (H, momenta, action)
+    way = (None, method, *((None, None) if method is None else (1.0, None)))
+    of, motion = _motion(L, q0, v0, t, p0, z0, way, coordinates, parameters, more, kind)
     return Comparison(*_core.compare(motion), of.losses)

@@ -10,16 +10,17 @@ from ._events import events_of, has_reset, texts_of_events
 from ._rows import axes_of
 from ._solution import Interrupted, crossings
 from ._solve import columns_of, functions_of, system_and_start
-from ._system import check_used, copied, warn_of_gain, with_tables
+from ._system import Composed, check_used, copied, warn_of_gain, with_tables
 from ._watch import Watch
 
 
 def ensemble(
-    L,
-    q0,
+    L=None,
+    q0=None,
     v0=None,
     t=None,
     *,
+    H=None,
     p0=None,
     z0=0.0,
     accuracy=None,
@@ -35,6 +36,9 @@ def ensemble(
     rayleigh=None,
     tables=None,
     breaks=None,
+    momenta=None,
+    action=None,
+    constraints=None,
     progress=False,
 ):
     """M motions of one Lagrangian on several threads; the result does not depend on the number of threads.
@@ -59,6 +63,8 @@ def ensemble(
         By default the number of processors.
     progress : bool
         As in `solve`: the part of the members that have ended.
+    H, momenta, action, constraints
+        As in `solve`.
     accuracy, integrator, step, steps, observe, coordinates, force, rayleigh, tables, breaks
         As in `solve`.
 
@@ -73,10 +79,13 @@ def ensemble(
     Interrupted
         A `KeyboardInterrupt` with the ensemble: the members that had ended, and the others without success.
     """
+    arguments = locals()
+    if isinstance(L, Composed) and hasattr(L, "_ensemble"):
+        return L._ensemble(arguments)
     watch = Watch(progress, None, 1.0)
     system, request, columns = request_of(
         L, q0, v0, t, p0, z0, accuracy, integrator, step, steps, events, observe, coordinates, parameters, threads, force,
-        rayleigh, tables, breaks,
+        rayleigh, tables, breaks, H, momenta, action, constraints,
     )  # fmt: skip
     start, t, way, varied, values, threads, given = request
 
@@ -114,6 +123,10 @@ def request_of(
     rayleigh,
     tables,
     breaks,
+    H=None,
+    momenta=None,
+    action=None,
+    constraints=None,
 ):
     """The system and the request for the arguments of `ensemble`, and the columns."""
     if parameters is not None and not hasattr(parameters, "items"):
@@ -127,8 +140,8 @@ def request_of(
     }
     if np.ndim(q0) != 2:
         raise ValueError(f"`q0` has {np.ndim(q0)} dimensions; it must have the shape (M, n), with a row for each member")
-    more = force, rayleigh, tables, breaks
-    system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed, more)
+    more, kind = (force, rayleigh, tables, breaks, constraints, None), (H, momenta, action)
+    system, _, _ = system_and_start(L, np.zeros(np.shape(q0)[1]), v0, p0, coordinates, fixed, more, kind)
     if t is None:
         raise ValueError("`t` is not given: give the final time, or several times")
     if (v0 is None) == (p0 is None):
@@ -140,7 +153,7 @@ def request_of(
     columns = columns_of(observe, system, found)
     system = with_tables(system, found)
     if parameters or tables:
-        functions = (L, *functions_of(force, rayleigh))
+        functions = (L if H is None else H, *functions_of(force, rayleigh))
         check_used(system, parameters, tables, functions, [*texts_of_events(given), *columns])
     if "gamma" in system.parameters and len(q0):
         rate = v0 if p0 is None else p0

@@ -106,7 +106,7 @@ class Fit:
 
 
 def fit(
-    L,
+    L=None,
     q0=None,
     v0=None,
     t=None,
@@ -122,6 +122,7 @@ def fit(
     nodes=(),
     starts=(),
     max_evaluations=None,
+    H=None,
     p0=None,
     z0=0.0,
     accuracy=None,
@@ -135,7 +136,10 @@ def fit(
     rayleigh=None,
     tables=None,
     breaks=None,
+    momenta=None,
+    action=None,
     constraints=None,
+    friction=None,
     project=False,
 ):
     """Fits parameters and the start of a motion to data, with the exact Jacobian of the computed motion.
@@ -145,8 +149,8 @@ def fit(
 
     Parameters
     ----------
-    L, q0, v0, p0, z0, accuracy, integrator, step, steps, scales, coordinates, parameters, force, rayleigh, tables, breaks,
-    constraints, project
+    L, q0, v0, H, p0, z0, accuracy, integrator, step, steps, scales, coordinates, parameters, force, rayleigh, tables, breaks,
+    momenta, action, constraints, friction, project
         As in `solve`. Without an integrator it is a Gauss method, whose steps have derivatives.
     t : array of shape (k,)
         The times of the data.
@@ -226,7 +230,8 @@ def fit(
         L, q0, v0, [t0, end], p0, z0, accuracy, integrator, step, steps, None,
         {name: event for name, (event, _) in events.items()}, None, False, False, scales,
         coordinates, parameters, force, rayleigh, tables, breaks,
-        constraints=constraints, project=project, also=[str(name) for name in data],
+        H=H, momenta=momenta, action=action, constraints=constraints, friction=friction, project=project,
+        also=[str(name) for name in data],
     )  # fmt: skip
     names = [*data, *events]
     series = [_series(name, values, times, sigma, names) for name, values in data.items()]

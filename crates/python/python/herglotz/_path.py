@@ -5,7 +5,7 @@ import numpy as np
 from . import _core
 from ._rows import Rows
 from ._solve import functions_of, system_and_start
-from ._system import check_used, copied
+from ._system import Composed, check_used, copied
 
 
 class Path(Rows):
@@ -109,19 +109,24 @@ def path(
     z0 : float
         The initial action.
     guess : array of shape (steps + 1, n), optional
-        The points of the initial guess, for example those of a path over another time span.
+        The points of the initial guess, for example those of a path over another time span. That of a rigid body, whose ends
+        are attitudes, is the angular velocity at the start.
     force, rayleigh, tables
         As in `system`.
 
     Returns
     -------
     Path
+        For a rigid body a `RigidBodySolution`, as of `rigid_body_between`.
 
     Raises
     ------
     ValueError
         For an invalid argument; whether a path was found is an attribute of the path.
     """
+    arguments = locals()
+    if isinstance(L, Composed) and hasattr(L, "_path"):
+        return L._path(arguments)
     more = force, rayleigh, tables, None
     given = L, *functions_of(force, rayleigh)
     L, q0, _ = system_and_start(L, q0, np.zeros(np.shape(q0)), None, coordinates, parameters, more)

@@ -1,5 +1,7 @@
 """The rows of a motion as tables and pictures."""
 
+import numpy as np
+
 
 class Rows:
     """What all results with rows at times `t` have; each names its columns and its arrays."""
@@ -60,3 +62,15 @@ def axes_of(ax):
     import matplotlib.pyplot
 
     return matplotlib.pyplot.gca() if ax is None else ax
+
+
+def times_after(asked, end, t):
+    """The times of a motion that is continued from its end: to `t`, or by default to those of `asked` that were not reached."""
+    asked = np.atleast_1d(np.asarray(asked, dtype=float))
+    start = asked[0] if len(asked) > 1 else 0.0
+    if t is None:
+        t = asked[asked > end] if asked[-1] > start else asked[asked < end]
+        if len(t) == 0:
+            raise ValueError("the motion has reached its end: give a later `t`")
+    times = np.array(t, dtype=float, ndmin=1)
+    return times if len(times) and times[0] == end else np.concatenate([[end], times])

@@ -7,7 +7,7 @@ from ._additions import breaks_of
 from ._events import events_of, texts_of_events
 from ._method import integrator_of
 from ._solution import Interrupted, Solution
-from ._system import check_used, copied, expression, system_of, warn_of_gain, with_tables
+from ._system import Composed, check_used, copied, expression, system_of, warn_of_gain, with_tables
 from ._watch import NOTHING, watch_of
 
 
@@ -125,6 +125,8 @@ def solve(
         A `KeyboardInterrupt` with the solution up to the interruption.
     """
     arguments = locals()
+    if isinstance(L, Composed):
+        return L._solve(arguments)
     watch = watch_of(arguments)
     return run(*request_of(**arguments), watch=watch)
 
@@ -231,6 +233,9 @@ def system_and_start(L, q0, v0, p0, coordinates, parameters, more=(None,) * 5, k
         entry = CATALOGUE[L]
         if q0 is None and v0 is None and p0 is None:
             q0, v0 = entry[5], entry[6]
+    if isinstance(L, Composed):
+        L, parameters = L._with(parameters)
+        L = L.system
     if q0 is None:
         raise ValueError("`q0` is not given: give the initial position")
     n = len(q0) if hasattr(q0, "__len__") else 1

@@ -6,10 +6,90 @@ import re
 import numpy as np
 
 from . import _core
-from ._rows import Rows, axes_of
+from ._rows import Rows, axes_of, times_after
 from ._solution import Interrupted, States
-from ._system import copied, warn_of_gain, warn_of_positive
+from ._system import Composed, copied, is_absent, system_of, warn_of_gain, warn_of_positive
 from ._watch import Watch
+
+# Up to this number of coordinates all integrators are those of a formula.
+_FEW = 16
+# Up to this number, a formula runs by contact Gauss collocation.
+_MOST_OF_FORMULA = 256
+# The arguments of `solve` that the sparse integrators have.
+_OF_RUN = frozenset(
+    "L q0 v0 t p0 z0 integrator step steps every conformal_factor progress callback callback_interval".split()
+)
+
+
+class SparseSystem(Composed):
+    """A system of many coordinates, as a sum of local terms; made by `lattice` and `bodies` without a start.
+
+    It takes the place of a Lagrangian in `solve` and in all other functions. With given steps, and without events, columns
+    and what else takes a formula, `solve` runs it by its sparse integrators where it has more than 16 coordinates. Else it is
+    a formula, with everything that formulas have, up to 256 coordinates.
+
+    Attributes
+    ----------
+    dimension : int
+        The number of coordinates.
+    shape : tuple of int
+        The axes of a position: those of the sites and, if there are several, the components.
+    parameters : dict of float
+        The parameters with their values; those of bodies are "G", "gamma" and the masses "m_0", "m_1" and so on.
+    """
+
+    def __init__(self, what, shape, made, parameters):
+        # The sparse integrators are reached by `what`, a formula by `made` with parameters.
+        self._what, self.shape, self._made, self.parameters = what, tuple(shape), made, dict(parameters)
+        self.dimension = int(np.prod(self.shape))
+
+    @property
+    def system(self):
+        """The same system as a formula: a `System` of up to 256 coordinates."""
+        if self.dimension > _MOST_OF_FORMULA:
+            raise ValueError(
+                f"a formula has at most {_MOST_OF_FORMULA} coordinates, and the {self._what} has {self.dimension}: it runs by "
+                "`solve` with given steps of a splitting, of midpoint, gauss_1 or gauss_2, without accuracy, events and columns"
+            )
+        text, coordinates, parameters = self._made[1](*self._made[2:], self.parameters)
+        return system_of(text, coordinates, parameters)
+
+    def with_parameters(self, parameters):
+        """The same system with other values of parameters."""
+        unknown = [name for name in parameters or {} if name not in self.parameters]
+        if unknown:
+            names = ", ".join(map(repr, self.parameters)) or "no parameters"
+            raise ValueError(f"the parameter {unknown[0]!r} is not one of the {self._what}: it has {names}")
+        return SparseSystem(self._what, self.shape, self._made, self.parameters | dict(parameters or {}))
+
+    def _solve(self, arguments):
+        """The motion for the arguments of `solve`."""
+        from ._solve import solve
+
+        of, arguments["parameters"] = self._with(arguments["parameters"])
+        for name in ("q0", "v0", "p0"):
+            if arguments[name] is not None:
+                x = _array(name, arguments[name])
+                arguments[name] = np.broadcast_to(x, self.dimension) if np.ndim(arguments[name]) == 0 else x.ravel()
+        asked = {name: x for name, x in arguments.items() if name in _OF_RUN and name != "L"}
+        others = {name for name, x in arguments.items() if name not in _OF_RUN and not is_absent(x)}
+        if self.dimension > _FEW and not others and isinstance(asked["integrator"], str) and (asked["step"], asked["steps"]) != (None, None):
+            watch = Watch(*(asked.pop(name) for name in ("progress", "callback", "callback_interval")))
+            if "gamma" in of.parameters:
+                warn_of_positive(of.parameters["gamma"])
+            return of._solution(**asked, watch=watch)
+        return solve(**arguments | {"L": of.system})
+
+    def _solution(self, q0, v0, t, p0, z0, integrator, step, steps, every, conformal_factor, watch):
+        """The motion by the sparse integrators; the arguments are those of `solve`."""
+        q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
+        if q0.size != self.dimension:
+            raise ValueError(f"`q0` has {q0.size} numbers, but the {self._what} has {self.dimension} coordinates")
+        run = functools.partial(self._made[0], *self._made[2:], self.parameters)
+        return _solution(run, request, q0.shape, len(q0.shape) > 1 and self._what == "system of bodies", watch)
+
+    def __repr__(self):
+        return f"<SparseSystem: a {self._what} of shape {self.shape}>"
 
 
 class SparseSolution(Rows):
@@ -95,18 +175,11 @@ class SparseSolution(Rows):
         watch = Watch(progress, callback, callback_interval)
         at, q, p, z, _ = self._end
         _, asked, every, (integrator, step, steps), conformal_factor = self._request
-        asked = np.atleast_1d(np.asarray(asked, dtype=float))
-        start = asked[0] if len(asked) > 1 else 0.0
-        if t is None:
-            t = asked[asked > at] if asked[-1] > start else asked[asked < at]
-            if len(t) == 0:
-                raise ValueError("the motion has reached its end: give a later `t`")
-        times = np.array(t, dtype=float, ndmin=1)
-        if len(times) == 0 or times[0] != at:
-            times = np.concatenate([[at], times])
+        times = times_after(asked, at, t)
         if steps is not None:
             # The number of steps was for another span.
-            step, steps = abs(asked[-1] - start) / steps, None
+            asked = np.atleast_1d(np.asarray(asked, dtype=float))
+            step, steps = abs(asked[-1] - (asked[0] if len(asked) > 1 else 0.0)) / steps, None
         request = (q, p, True, z), times, every, (integrator, step, steps), conformal_factor
         return _solution(self._run, request, self._shape, self._bodies, watch)
 
@@ -180,6 +253,7 @@ def lattice(
     *,
     p0=None,
     z0=0.0,
+    sites=None,
     boundary="periodic",
     integrator="strang",
     step=None,
@@ -192,7 +266,9 @@ def lattice(
     callback=None,
     callback_interval=1.0,
 ):
-    """The motion of a lattice of equal sites with bonds between neighbours, with any number of sites.
+    """A lattice of equal sites with bonds between neighbours, with any number of sites, or its motion.
+
+    With `sites` it is a system for `solve` and for all other functions; with `q0` it is run here, with given steps.
 
     Its Lagrangian is the sum of `site` over the sites, of `bond` over the pairs of neighbours along each axis, and of
     the drag gamma(t) z. The drag is written in `site`, so that each site satisfies its own Herglotz equation; z is the
@@ -214,6 +290,10 @@ def lattice(
         The initial momentum, in place of `v0`.
     z0 : float
         The initial action.
+    sites : int or tuple of int, optional
+        The number of sites along each direction of the lattice, in place of `q0`. In formulas about the whole lattice, as
+        those of events, the coordinates are ``x[0]``, ``x[1]`` and so on; with several coordinates at a site ``x_0``,
+        ``y_0``, ``x_1``, ...
     boundary : {"periodic", "fixed", "free"}
         The boundary condition along each axis: periodic, walls at 0, or free ends.
     integrator : str
@@ -234,7 +314,7 @@ def lattice(
 
     Returns
     -------
-    SparseSolution
+    SparseSystem or SparseSolution
 
     Raises
     ------
@@ -245,6 +325,14 @@ def lattice(
 
     Examples
     --------
+    Four coupled pendulums, to an accuracy and with an event:
+
+    >>> import herglotz as hz
+    >>> chain = hz.lattice("x'^2/2 + cos(x) + gamma*z", "-(xr - xl)^2/2", sites=4, parameters={"gamma": -0.1})
+    >>> sol = hz.solve(chain, [0.1, 0.3, 0.0, 0.2], [0.0] * 4, 20.0, events="x[0]")
+    >>> len(sol.events[0]) > 2
+    True
+
     A wave in a thousand pendulums coupled by springs:
 
     >>> import numpy as np, herglotz as hz
@@ -254,7 +342,6 @@ def lattice(
     >>> sol.q.shape
     (101, 1000)
     """
-    watch = Watch(progress, callback, callback_interval)
     coordinates = [coordinates] if isinstance(coordinates, str) else list(coordinates)
     for name, of, example in (("site", site, "x'^2/2 - (1 - cos(x)) + gamma*z"), ("bond", bond, "-k*(xr - xl)^2/2")):
         if not isinstance(of, str) and (name == "site" or of is not None):
@@ -262,15 +349,23 @@ def lattice(
                 f"`{name}` is {of!r}; a lattice is written by formulas, as in {name}=\"{example}\", and takes no functions: "
                 "functions are for `solve`"
             )
-    q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
-    sizes = q0.shape
-    if len(coordinates) > 1:
-        if sizes[-1:] != (len(coordinates),):
-            raise ValueError(f"`q0` has the shape {sizes}; its last axis must have the {len(coordinates)} coordinates of a site")
-        sizes = sizes[:-1]
-    parameters = dict(parameters) if parameters else None
-    run = functools.partial(_run_lattice, (coordinates, site, bond), sizes, boundary, parameters)
-    found = _solution(run, request, q0.shape, False, watch)
+    _one_of("sites", sites, q0)
+    if q0 is not None:
+        sizes = np.shape(_array("q0", q0))
+        if len(coordinates) > 1:
+            if sizes[-1:] != (len(coordinates),):
+                raise ValueError(f"`q0` has the shape {sizes}; its last axis must have the {len(coordinates)} coordinates of a site")
+            sizes = sizes[:-1]
+    else:
+        sizes = tuple(int(size) for size in np.atleast_1d(sites))
+    shape = sizes if len(coordinates) == 1 else (*sizes, len(coordinates))
+    made = _run_lattice, _core.lattice_terms, (coordinates, site, bond), sizes, boundary
+    system = SparseSystem("lattice", shape, made, parameters or {})
+    if q0 is None:
+        _no_motion(v0=v0, t=t, p0=p0, step=step, steps=steps, every=every)
+        return system
+    watch = Watch(progress, callback, callback_interval)
+    found = system._solution(q0, v0, t, p0, z0, integrator, step, steps, every, conformal_factor, watch)
     if parameters and "gamma" in parameters:
         warn_of_gain(_core.System(site, coordinates, parameters), np.zeros(len(coordinates)))
     return found
@@ -278,11 +373,12 @@ def lattice(
 
 def bodies(
     masses,
-    q0,
+    q0=None,
     v0=None,
     t=None,
     *,
     p0=None,
+    dimensions=None,
     G=1.0,
     gamma=0.0,
     z0=0.0,
@@ -295,11 +391,11 @@ def bodies(
     callback=None,
     callback_interval=1.0,
 ):
-    """The motion of any number of bodies with Newtonian gravitation of each pair and linear drag.
+    """Any number of bodies with Newtonian gravitation of each pair and linear drag, or their motion.
 
-    L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z. All steps have the same length, which must
-    resolve the closest encounter. A few bodies (up to 5 in space or 8 in the plane) can also be given to `solve`, which
-    chooses its steps.
+    L = sum m_i |v_i|^2/2 + sum_(i<j) G m_i m_j/|q_i - q_j| + gamma z. With `dimensions` it is a system for `solve`, which
+    chooses the steps for an accuracy, and for all other functions; with `q0` it is run here, by steps of one length, which
+    must resolve the closest encounter.
 
     Parameters
     ----------
@@ -311,6 +407,8 @@ def bodies(
         number is the final time of a motion from 0.
     p0 : array, optional
         The initial momentum, in place of `v0`.
+    dimensions : {2, 3}, optional
+        The plane or space, in place of `q0`. In formulas the coordinates are ``x_0``, ``y_0``, ``x_1`` and so on.
     G : float
         The gravitational constant.
     gamma : float
@@ -330,7 +428,7 @@ def bodies(
 
     Returns
     -------
-    SparseSolution
+    SparseSystem or SparseSolution
 
     Raises
     ------
@@ -339,14 +437,36 @@ def bodies(
     Interrupted
         A `KeyboardInterrupt` with the solution up to the interruption.
     """
-    watch = Watch(progress, callback, callback_interval)
-    q0, request = _request(q0, v0, p0, z0, t, every, integrator, step, steps, conformal_factor)
     masses = _array("masses", masses)
+    _one_of("dimensions", dimensions, q0)
+    if q0 is not None:
+        shape = np.shape(_array("q0", q0))
+        if len(shape) != 2 or shape[0] != len(masses):
+            raise ValueError(f"`q0` has the shape {shape}; it must have a row for each of the {len(masses)} bodies")
+        dimensions = shape[1]
+    given = {f"m_{i}": m for i, m in enumerate(masses)} | {"G": G, "gamma": gamma}
+    made = _run_bodies, _bodies_terms, len(masses), dimensions
+    system = SparseSystem("system of bodies", (len(masses), dimensions), made, given)
+    if q0 is None:
+        _no_motion(v0=v0, t=t, p0=p0, step=step, steps=steps, every=every)
+        return system
+    watch = Watch(progress, callback, callback_interval)
     warn_of_positive(gamma)
-    if q0.ndim != 2 or len(q0) != len(masses):
-        raise ValueError(f"`q0` has the shape {q0.shape}; it must have a row for each of the {len(masses)} bodies")
-    run = functools.partial(_run_bodies, masses, q0.shape[1], G, gamma)
-    return _solution(run, request, q0.shape, True, watch)
+    return system._solution(q0, v0, t, p0, z0, integrator, step, steps, every, conformal_factor, watch)
+
+
+def _one_of(name, x, q0):
+    """Refuses a system that is neither for `solve` nor for a motion here, or both."""
+    if (x is None) == (q0 is None):
+        which = "`q0` is not given" if q0 is None else f"`q0` and `{name}` are both given"
+        raise ValueError(f"{which}: give `q0` for a motion here, or `{name}` for a system that `solve` runs")
+
+
+def _no_motion(**given):
+    """Refuses arguments of a motion beside a system without a start."""
+    for name, x in given.items():
+        if x is not None:
+            raise ValueError(f"`{name}` is given without `q0`: give it to `solve`, as in hz.solve(system, q0, v0, t)")
 
 
 # These functions are defined in the module so that a solution can be pickled.
@@ -354,8 +474,16 @@ def _run_lattice(*arguments):
     return _core.run_lattice(*arguments)
 
 
-def _run_bodies(*arguments):
-    return _core.run_bodies(*arguments)
+def _of_bodies(count, dimensions, parameters):
+    return [parameters[f"m_{i}"] for i in range(count)], dimensions, parameters["G"], parameters["gamma"]
+
+
+def _run_bodies(count, dimensions, parameters, *request):
+    return _core.run_bodies(*_of_bodies(count, dimensions, parameters), *request)
+
+
+def _bodies_terms(count, dimensions, parameters):
+    return _core.bodies_terms(*_of_bodies(count, dimensions, parameters))
 
 
 def _array(name, x):

@@ -16,6 +16,21 @@ _SYSTEMS = {}
 _MOST = 256
 
 
+class Composed:
+    """What stands for a Lagrangian: `solve` leaves its motion to it, and elsewhere it is its `system`."""
+
+    def _with(self, parameters):
+        """The same with those of the parameters that it has, and the others, which events, columns and forces may have."""
+        given = dict(parameters or {})
+        own = {name: x for name, x in given.items() if name in self.parameters}
+        return (self.with_parameters(own) if own else self), {name: x for name, x in given.items() if name not in own} or None
+
+
+def is_absent(x):
+    """Whether an argument has the value that it has by default where nothing is requested."""
+    return x is None or x is False or isinstance(x, tuple) and not x
+
+
 def system(
     L=None,
     coordinates=None,
@@ -112,6 +127,9 @@ def system_of(
         raise ValueError(f"`parameters` is {parameters!r}; it must give values by name, as in parameters={{\"gamma\": -0.1}}")
     if (L is None) == (H is None):
         raise ValueError("give either `L` or `H`")
+    if isinstance(L, Composed):
+        L, parameters = L._with(parameters)
+        L = L.system
     if momenta is not None and H is None:
         raise ValueError("`momenta` are names for `H`: remove them, or give `H`")
     if isinstance(momenta, str):

@@ -318,8 +318,8 @@ impl Kernel for ManyCoordinates {
     ) -> Result<LyapunovExponents, RuntimeError> {
         let until = Until::Time(motion.end);
         self.observed(&unobserved(motion), (monitor, None), |run| {
-            let has_noncontact_resets = self.0.formula().has_noncontact_resets();
-            Ok(exponents_of(run.lyapunov_exponents(until)?, self.0.proved(), self.0.has_force(), has_noncontact_resets))
+            let is_of_contact = !self.0.has_force() && !self.0.formula().has_noncontact_resets();
+            Ok(exponents_of(run.lyapunov_exponents(until)?, self.0.proved(), is_of_contact))
         })
     }
 

@@ -248,7 +248,6 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         motion: &Motion,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
-        refuse_constraints(self.formula(), "Lyapunov exponents")?;
         sensitivity::lyapunov_exponents(self, motion, monitor)
     }
 

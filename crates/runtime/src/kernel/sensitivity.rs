@@ -96,17 +96,17 @@ pub(super) fn lyapunov_exponents<L: FormulaSystem<N> + Parametric<N>, const N: u
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
     let run = run::of(system, &problem, motion)?.observe(&mut recorder);
     let found = run.lyapunov_exponents_within(n, Until::Time(motion.end))?;
-    Ok(exponents_of(found, &system.0.structure(), system.0.has_force(), system.0.formula().has_noncontact_resets()))
+    let formula = system.0.formula();
+    let is_of_contact = !system.0.has_force() && !formula.has_noncontact_resets() && formula.constraints() == 0;
+    Ok(exponents_of(found, &system.0.structure(), is_of_contact))
 }
 
-/// The exponents of a system with this structure.
+/// The exponents of a system with this structure, and whether their sums are known to round-off.
 pub(super) fn exponents_of(
     found: discrete_herglotz::sensitivity::LyapunovExponents,
     structure: &Structure,
-    has_force: bool,
-    has_noncontact_resets: bool,
+    is_of_contact: bool,
 ) -> LyapunovExponents {
-    let is_of_contact = !has_force && !has_noncontact_resets;
     let is_paired = structure.has_constant_rate() && is_of_contact;
     LyapunovExponents {
         status: found.outcome.status,

@@ -35,6 +35,21 @@ impl Bodies {
     /// [`RuntimeError::Argument`] for fewer than two bodies, an invalid mass, or another number of dimensions;
     /// [`RuntimeError::NotFinite`] for `G` and `gamma`.
     pub fn system(&self) -> Result<SiteSystem, RuntimeError> {
+        self.check()?;
+        let Bodies { masses, dimensions, g, gamma } = self;
+        let n = masses.len();
+        let each: Vec<f64> = (0..n * dimensions).filter_map(|k| masses.get(k % n).copied()).collect();
+        let make =
+            || Ok::<_, RuntimeError>(SparseSystem::new(n * dimensions)?.with_masses(each.clone()).with_drag(*gamma));
+        let system = match dimensions {
+            2 => attracting::<2, 4>(make()?, masses, *g)?,
+            _ => attracting::<3, 6>(make()?, masses, *g)?,
+        };
+        Ok(SiteSystem { system, sites: n, components: *dimensions, masses: each, full: true })
+    }
+
+    /// Refuses what is no system of bodies.
+    pub(super) fn check(&self) -> Result<(), RuntimeError> {
         let Bodies { masses, dimensions, g, gamma } = self;
         if masses.len() < 2 {
             return Err(RuntimeError::argument(
@@ -53,21 +68,13 @@ impl Bodies {
                 return Err(RuntimeError::NotFinite { what: what.into(), value });
             }
         }
-        let n = masses.len();
-        let each: Vec<f64> = (0..n * dimensions).filter_map(|k| masses.get(k % n).copied()).collect();
-        let make =
-            || Ok::<_, RuntimeError>(SparseSystem::new(n * dimensions)?.with_masses(each.clone()).with_drag(*gamma));
-        let system = match dimensions {
-            2 => attracting::<2, 4>(make()?, masses, *g)?,
-            3 => attracting::<3, 6>(make()?, masses, *g)?,
-            other => {
-                return Err(RuntimeError::argument(
-                    "q0",
-                    format!("has {other} components for each body; it must have 2 or 3"),
-                ));
-            }
-        };
-        Ok(SiteSystem { system, sites: n, components: *dimensions, masses: each, full: true })
+        if !matches!(dimensions, 2 | 3) {
+            return Err(RuntimeError::argument(
+                "q0",
+                format!("has {dimensions} components for each body; it must have 2 or 3"),
+            ));
+        }
+        Ok(())
     }
 }
 

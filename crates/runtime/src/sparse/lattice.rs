@@ -9,6 +9,9 @@ use formula_lagrangian::{Formula, FormulaLagrangian};
 use sparse_herglotz::{FIXED, SparseSystem};
 use std::str::FromStr;
 
+pub(super) const NOT_AFFINE: &str =
+    "depends on z in another form than `gamma*z` with a gamma that is a number or a function of t";
+
 /// Boundary conditions of a lattice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Boundary {
@@ -88,7 +91,7 @@ impl Lattice {
     }
 
     /// The number of sites, validated.
-    fn sites(&self) -> Result<usize, RuntimeError> {
+    pub(super) fn sites(&self) -> Result<usize, RuntimeError> {
         let least = if self.boundary == Boundary::Periodic && self.bond.is_some() { 2 } else { 1 };
         if let Some(size) = self.sizes.iter().find(|size| **size < least) {
             return Err(RuntimeError::argument(
@@ -103,14 +106,39 @@ impl Lattice {
         }
     }
 
-    fn of<const D: usize, const K: usize>(&self) -> Result<SiteSystem, RuntimeError> {
-        let sites = self.sites()?;
+    /// The formulas of a site and of a bond, validated as far as all lattices need it.
+    pub(super) fn parts(&self) -> Result<(Formula, Option<Formula>), RuntimeError> {
         let names: Vec<&str> = self.coordinates.iter().map(String::as_str).collect();
         let of_bond = ["l", "r"].map(|side| names.iter().map(move |name| format!("{name}{side}")));
         let of_bond: Vec<String> = of_bond.into_iter().flatten().collect();
         let of_bond: Vec<&str> = of_bond.iter().map(String::as_str).collect();
         let site = self.parse("site", &self.site, &names)?;
         let bond = self.bond.as_ref().map(|text| self.parse("bond", text, &of_bond)).transpose()?;
+        for (part, formula) in [("site", Some(&site)), ("bond", bond.as_ref())] {
+            if formula.is_some_and(Formula::has_forces) {
+                return Err(RuntimeError::argument(
+                    part,
+                    "has a force; give the forces of a lattice to the formula of the whole lattice",
+                ));
+            }
+        }
+        if let Some(bond) = &bond
+            && !bond.derivatives()?.proved().z_free
+        {
+            return Err(RuntimeError::argument(
+                "bond",
+                "depends on z; write the drag `gamma*z` in `site`, where it counts once for the lattice",
+            ));
+        }
+        Ok((site, bond))
+    }
+
+    /// Refuses parameters that neither formula uses: most are misspelt.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Argument`] with the name; [`RuntimeError::Part`] for a formula that is not valid.
+    pub fn check_parameters(&self) -> Result<(), RuntimeError> {
+        let (site, bond) = self.parts()?;
         for (name, _) in &self.parameters {
             let mut used = [Some(&site), bond.as_ref()].into_iter().flatten().flat_map(Formula::used_parameters);
             if !used.any(|known| known == name) {
@@ -119,6 +147,13 @@ impl Lattice {
                 return Err(RuntimeError::argument("parameters", format!("has `{name}`, which is {where_to}")));
             }
         }
+        Ok(())
+    }
+
+    fn of<const D: usize, const K: usize>(&self) -> Result<SiteSystem, RuntimeError> {
+        let sites = self.sites()?;
+        self.check_parameters()?;
+        let (site, bond) = self.parts()?;
         let site = lagrangian::<D>("site", &site)?;
         let bond = bond.map(|bond| lagrangian::<K>("bond", &bond)).transpose()?;
         let (masses, system) = (masses(&site)?, SparseSystem::new(sites * D)?);
@@ -189,10 +224,7 @@ fn rate<const N: usize>(site: &FormulaLagrangian<N>, t: f64) -> f64 {
 fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], RuntimeError> {
     let proved = site.proved();
     if !proved.is_affine_in_z() {
-        return Err(RuntimeError::argument(
-            "site",
-            "depends on z in another form than `gamma*z` with a gamma that is a number or a function of t",
-        ));
+        return Err(RuntimeError::argument("site", NOT_AFFINE));
     }
     let matrix = site.closed_mass_matrix(0.0, &origin()).filter(|_| proved.separable);
     let diagonal = matrix.filter(|m| (0..N * N).all(|k| k % N == k / N || m[(k % N, k / N)] == 0.0));
@@ -210,16 +242,9 @@ fn masses<const N: usize>(site: &FormulaLagrangian<N>) -> Result<[f64; N], Runti
     }
 }
 
-/// Rejects terms of a bond that belong to a site.
+/// Rejects a bond with velocities.
 fn check_bond<const N: usize>(bond: &FormulaLagrangian<N>) -> Result<(), RuntimeError> {
-    let proved = bond.proved();
-    if !proved.z_free {
-        return Err(RuntimeError::argument(
-            "bond",
-            "depends on z; write the drag `gamma*z` in `site`, where it counts once for the lattice",
-        ));
-    }
-    let masses = bond.closed_mass_matrix(0.0, &origin()).filter(|_| proved.separable);
+    let masses = bond.closed_mass_matrix(0.0, &origin()).filter(|_| bond.proved().separable);
     if masses.is_none_or(|m| m.iter().any(|m| *m != 0.0)) {
         return Err(RuntimeError::argument(
             "bond",

@@ -4,10 +4,12 @@ mod bodies;
 mod lattice;
 mod run;
 mod stepper;
+mod sum_of_terms;
 mod system;
 mod term;
 
 pub use bodies::Bodies;
 pub use lattice::{Boundary, Lattice};
 pub use run::SiteMotion;
+pub use sum_of_terms::SumOfTerms;
 pub use system::SiteSystem;

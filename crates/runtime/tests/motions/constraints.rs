@@ -240,13 +240,10 @@ fn a_force_under_constraints() {
 #[test]
 fn what_is_refused_with_constraints() {
     let system = pendulum(NEWTON);
-    let motion = Motion::new(at_rest(), 1.0, named("gauss_2", 20));
     let by = "gauss_2".parse().unwrap();
     for (what, error) in [
         ("geometry", system.geometry(&at_rest()).err()),
         ("path", system.path(&BoundaryProblem::new([vec![1.0, 0.0], vec![0.0, -1.0]], (0.0, 1.0), by, 10)).err()),
-        ("exponents", system.lyapunov_exponents(&motion, &mut ()).err()),
-        ("comparison", system.compare(&motion, &[], &mut |_| true).err()),
     ] {
         assert!(matches!(error, Some(RuntimeError::WithConstraints { .. })), "{what}: {error:?}");
     }
@@ -265,6 +262,52 @@ fn what_is_refused_with_constraints() {
     let nine = Formula::parse("sum(i, 0, n-1, v[i]^2)/2", &["q[9]"], &[]).unwrap();
     let error = System::new(&nine.with_constraints(&["q[0] = 0"]).unwrap()).err().unwrap();
     assert!(matches!(error, RuntimeError::ConstrainedDimension { found: 9, most: 8 }), "{error}");
+}
+
+/// The exponents of a driven pendulum on its circle. In q and p the angle has the length `dtheta^2 (1 + omega^2) + domega^2`,
+/// so that the sum of the exponents differs from twice the rate by the logarithms of `1 + omega^2` at both ends, and each of
+/// them from that of the angle by at most its largest value.
+#[test]
+fn lyapunov_exponents_on_the_constraints() {
+    let drive = [("gamma", -0.1), ("a", 1.2)];
+    let held = Formula::parse("(x'^2 + y'^2)/2 - 2*y + a*x*cos(0.7*t) + gamma*z", &["x", "y"], &drive).unwrap();
+    let held = System::new(&held.with_constraints(&["x^2 + y^2 = 1"]).unwrap()).unwrap();
+    let text = "u'^2/2 - 2*sin(u) + a*cos(u)*cos(0.7*t) + gamma*z";
+    let angle = System::parse(text, &["u"], &drive).unwrap();
+    let (end, omega) = (40.0, 1.5);
+    for by in ["gauss_4", "kahan_li_6"] {
+        let steps = named(by, 800);
+        let motion = Motion::new(Start::new(0.0, [1.0, 0.0], [0.0, omega], 0.0), end, steps);
+        let found = held.lyapunov_exponents(&motion, &mut ()).unwrap();
+        assert_eq!((found.exponents.len(), found.pairs.len(), found.pairing_defect), (3, 0, None));
+        let last = held.run(&motion, &mut ()).unwrap();
+        let size = |square: f64| 0.5 * (1.0 + square).ln();
+        let ends = size(last.p.iter().map(|p| p * p).sum()) - size(omega * omega);
+        let sum: f64 = found.exponents.iter().sum();
+        // Round-off of 800 steps, which the motion enlarges by e^(lambda t).
+        assert!((end * (sum - 2.0 * found.rate) - ends).abs() < 1e-9, "{by}: {sum} {}", found.rate);
+        let motion = Motion::new(Start::new(0.0, [0.0], [omega], 0.0), end, named("gauss_4", 800));
+        let of_angle = angle.lyapunov_exponents(&motion, &mut ()).unwrap();
+        for (a, b) in found.exponents.iter().zip(&of_angle.exponents) {
+            assert!((a - b).abs() < 2.0 * size(16.0) / end, "{by}: {a} {b}");
+        }
+    }
+}
+
+/// A comparison of integrators: those for constraints, against the contact Lobatto method of order 14.
+#[test]
+fn a_comparison_under_constraints() {
+    let system = pendulum(NEWTON);
+    let motion = Motion::new(at_rest(), 0.5, named("gauss_2", 20));
+    let found = system.compare(&motion, &[], &mut |_| true).unwrap();
+    let least = |by: &str| {
+        found.rows.iter().filter(|row| row.integrator == by).map(|row| row.error).fold(f64::INFINITY, f64::min)
+    };
+    for by in ["gauss_2", "gauss_7", "strang", "kahan_li_8"] {
+        assert!(least(by) < 1e-4, "{by}: {}", least(by));
+    }
+    assert!(least("gauss_7") < 1e-12 && found.reference.starts_with("gauss_7"), "{}", found.reference);
+    assert!(found.left_out.iter().any(|(by, _)| by == "midpoint"), "{:?}", found.left_out);
 }
 
 /// A chain of five coordinates runs in eight, and three in four: the coordinates in addition do not move.
