@@ -1,6 +1,7 @@
 //! Forces, and Lagrangians on which they act.
 
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{Force, ForceStructure, Lagrangian, Scalar, Structure, VelocityPoint};
 
 /// Gravity.
@@ -12,7 +13,7 @@ pub struct Fall;
 
 impl<const N: usize> Lagrangian<N> for Fall {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, _z: T) -> T {
-        v.dot(v) * 0.5 - q[0] * G
+        dot(v, v) * 0.5 - q[0] * G
     }
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_free: true, separable: true, quadratic: true, ..Structure::default() }
@@ -28,7 +29,7 @@ pub struct Drag {
 
 impl<const N: usize> Force<N> for Drag {
     fn value<T: Scalar>(&self, _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        let speed = x.v.dot(&x.v).sqrt();
+        let speed = dot(x.v, x.v).sqrt();
         x.v.map(|v| -(v * (speed * self.k + self.c)))
     }
     fn structure(&self) -> ForceStructure<N> {

@@ -52,8 +52,8 @@ pub mod constraints {
 /// Vector spaces of dual parts, vectors from functions of the index, and maxima that propagate NaN.
 pub mod numbers {
     pub use crate::number::{
-        AugmentedVector, Coefficient, MaxAbsOrNan, MaxOrNan, ScalarOver, TangentVector, max_abs_or_nan, max_or_nan,
-        vector_of,
+        AugmentedVector, Coefficient, MaxAbsOrNan, MaxOrNan, ScalarOver, TangentVector, dot, max_abs_or_nan,
+        max_or_nan, vector_of,
     };
 }
 

@@ -5,6 +5,7 @@ use crate::gradients::runs::Case;
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use contact_examples::systems::UniformField;
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::switching::{Breaks, Control, Impact, Impacts, Surface};
 use contact_geom::{Hints, Lagrangian, Parametric, Scalar, VelocityPoint};
 use discrete_herglotz::sensitivity::{EndCovector, Variable};
@@ -58,7 +59,7 @@ mod formula {
         let (zero, inside) = (T::zero(), Region::surface([theta[2], theta[3], theta[4]], t, q));
         let potential = inside.if_less(zero, theta[0] * (q[0] * 0.3 + 1.0), zero);
         let mass = inside.if_less(zero, theta[1], T::one());
-        v.dot(v) * mass * 0.5 - potential - q[1] * 0.1 - z * 0.05
+        dot(v, v) * mass * 0.5 - potential - q[1] * 0.1 - z * 0.05
     }
 
     pub fn Step<T: Scalar>(theta: &[T], _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, _z: T) -> T {

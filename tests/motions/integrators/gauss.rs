@@ -10,6 +10,7 @@ use contact_examples::systems::{
     Relativistic, System, TwoCoordinates,
 };
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{
     Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
     numbers::{MaxAbsOrNan, MaxOrNan},
@@ -363,7 +364,7 @@ pub struct Ends;
 
 impl Lagrangian<2> for Ends {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-        v.dot(v) * 0.5 + (-q[0] + 2.0).sqrt() - q[1] * q[1] * 0.5
+        dot(v, v) * 0.5 + (-q[0] + 2.0).sqrt() - q[1] * q[1] * 0.5
     }
     fn structure(&self) -> Structure {
         Structure {

@@ -6,6 +6,7 @@ use crate::common::lagrangians::WithStructure;
 use crate::lagrangians::{One, Two, one};
 use contact_examples::systems::{HarmonicOscillator, Kepler, LaneEmden, OneCoordinate, Pendulum, QuadraticInZ, System};
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::dot;
 use contact_geom::{GeometryError, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint, legendre};
 use discrete_herglotz::{InputError, RunSupport, StepError, Stepper, gauss::Gauss};
 
@@ -22,7 +23,7 @@ impl Lagrangian<4> for StiffChain {
             square * (square * 0.125 + 0.5)
         };
         let stiff = bond(q[1] - q[0]) + bond(q[3] - q[2]);
-        v.dot(v) * 0.5 - bond(q[0]) - bond(q[2] - q[1]) - bond(q[3]) - stiff * self.k - z * 0.1
+        dot(v, v) * 0.5 - bond(q[0]) - bond(q[2] - q[1]) - bond(q[3]) - stiff * self.k - z * 0.1
     }
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_affine: true, separable: true, constant_mass: true, ..Structure::default() }

@@ -6,6 +6,7 @@ use crate::lagrangians::{self, KindVisitor, visit_kinds};
 use crate::paper::table::{Row, at_points_of_every_system};
 use contact_examples::systems::{Kepler, System};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{Force, Forced, Lagrangian, Scalar, Statement, VelocityPoint, legendre, statements::AnyForce};
 use discrete_herglotz::gauss::VirtualWork;
 use discrete_herglotz::statements::forced_residual;
@@ -64,7 +65,7 @@ pub struct Central;
 
 impl<const N: usize> Force<N> for Central {
     fn value<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
-        let size = (x.v.dot(&x.v) * 0.3 + t.sin() + x.z * 0.2) * 0.4;
+        let size = (dot(x.v, x.v) * 0.3 + t.sin() + x.z * 0.2) * 0.4;
         x.q.map(|q| -(q * size))
     }
 }

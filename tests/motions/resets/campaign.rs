@@ -2,6 +2,7 @@
 
 use crate::common::draws::Draws;
 use crate::lagrangians::SwitchingTwo;
+use contact_geom::numbers::dot;
 use contact_geom::switching::{Impact, Impacts, Surface};
 use contact_geom::{Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, Problem, Resets, Status, StepError, Steps, Until};
@@ -16,7 +17,7 @@ pub struct Flight {
 impl Lagrangian<2> for Flight {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, z: T) -> T {
-        v.dot(v) * 0.5 - q[1] * self.g + z * self.gamma
+        dot(v, v) * 0.5 - q[1] * self.g + z * self.gamma
     }
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_affine: true, separable: true, constant_mass: true, ..Structure::default() }
@@ -91,7 +92,7 @@ struct Free;
 
 impl Lagrangian<2> for Free {
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-        v.dot(v) * 0.5
+        dot(v, v) * 0.5
     }
 }
 

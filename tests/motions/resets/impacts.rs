@@ -3,6 +3,7 @@
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
 use contact_examples::systems::{Pendulum, UniformField};
+use contact_geom::numbers::dot;
 use contact_geom::switching::{Control, Impact, Impacts, Surface};
 use contact_geom::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{AnyIntegrator, GaussCollocation, Outcome, Problem, Resets, Status, StepError, Steps, Until};
@@ -98,7 +99,7 @@ impl Lagrangian<2> for Resting {
 
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-        v.dot(v) * 0.5 - q[1].if_less(T::from(0.5), q[0], T::zero())
+        dot(v, v) * 0.5 - q[1].if_less(T::from(0.5), q[0], T::zero())
     }
     fn structure(&self) -> Structure {
         Structure::default()

@@ -4,6 +4,7 @@ use crate::common::observers::StopsAt;
 use crate::lagrangians::{SwitchingOne, SwitchingTwo};
 use crate::resets::Floor;
 use contact_examples::systems::UniformField;
+use contact_geom::numbers::dot;
 use contact_geom::switching::{Control, Impact, Impacts};
 use contact_geom::{Hints, Lagrangian, Scalar, VelocityPoint, nalgebra::SVector};
 use discrete_herglotz::{
@@ -109,7 +110,7 @@ impl Lagrangian<2> for Walls {
     const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
 
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-        v.dot(v) * 0.5
+        dot(v, v) * 0.5
     }
     fn switching_functions(&self, _t: f64, x: &VelocityPoint<2>, values: &mut Vec<f64>) {
         values.extend(x.q.iter());

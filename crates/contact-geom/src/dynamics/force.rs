@@ -1,6 +1,7 @@
 //! Forces that no Lagrangian contains.
 
 use crate::dynamics::lagrangian::forward_lagrangian;
+use crate::numbers::dot;
 use crate::{Hints, Lagrangian, Scalar, Structure, VelocityPoint, vector};
 use nalgebra::{SMatrix, SVector};
 
@@ -118,7 +119,7 @@ impl<const N: usize> Force<N> for VelocityDrag<N> {
         if self.quadratic == 0.0 {
             return vector!(|i| -(x.v[i] * self.linear[i]));
         }
-        let speed = x.v.dot(&x.v).sqrt() * self.quadratic;
+        let speed = dot(x.v, x.v).sqrt() * self.quadratic;
         vector!(|i| -(x.v[i] * (speed + self.linear[i])))
     }
     fn structure(&self) -> ForceStructure<N> {

@@ -1,6 +1,7 @@
 //! Parameters of Lagrangians and of forces, with respect to which motions can be differentiated.
 
 use crate::dynamics::nearest_name::nearest_name;
+use crate::numbers::dot;
 use crate::switching::BreakRate;
 use crate::{Force, Forced, Lagrangian, PhasePoint, Scalar, VelocityDrag, VelocityPoint};
 use nalgebra::SVector;
@@ -224,7 +225,7 @@ impl<const N: usize> ParametricForce<N> for VelocityDrag<N> {
     #[inline(always)]
     fn value_at<T: Scalar>(&self, theta: &[T], _t: T, x: &VelocityPoint<N, T>) -> SVector<T, N> {
         // The differential of the root at rest is that along a direction of constant sign.
-        let speed = x.v.dot(&x.v).sqrt() * theta[N];
+        let speed = dot(x.v, x.v).sqrt() * theta[N];
         SVector::from_fn(|i, _| -(x.v[i] * (speed + theta[i])))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{GroupError, GroupLagrangian, GroupPartials, GroupPotential, Inertia, LieGroup};
 use crate::Scalar;
+use crate::numbers::dot;
 use crate::support::linear::SingularMatrix;
 use nalgebra::{SMatrix, SVector, SymmetricEigen};
 
@@ -148,7 +149,7 @@ impl<G: LieGroup<N>, V: GroupPotential<G, N>, const N: usize> GroupLagrangian<G,
         let (potential, gradient) = self.potential.with_gradient(g);
         let momentum = self.momentum(xi);
         GroupPartials {
-            value: xi.dot(&momentum) * 0.5 - potential + z * self.gamma,
+            value: dot(xi, momentum) * 0.5 - potential + z * self.gamma,
             force: -gradient,
             momentum,
             rate: T::from(self.gamma),

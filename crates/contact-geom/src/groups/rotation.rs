@@ -4,6 +4,7 @@ use super::lie_group::add_compensated;
 use super::stumpff::{arc_tangent_ratio, stumpff};
 use super::{GroupError, LieGroup};
 use crate::Scalar;
+use crate::numbers::dot;
 use nalgebra::{SMatrix, SVector};
 
 /// The group SO(3) of rotations of space, by unit quaternions. The algebra is R^3 with the vector product.
@@ -83,7 +84,7 @@ impl<T: Scalar> Rotation<T> {
 
     /// The quaternion divided by its norm.
     pub fn normalised(&self) -> Self {
-        let inverse = (self.w * self.w + self.u.dot(&self.u)).sqrt().recip();
+        let inverse = (self.w * self.w + dot(self.u, self.u)).sqrt().recip();
         Rotation { w: self.w * inverse, u: self.u * inverse }
     }
 }
@@ -103,7 +104,7 @@ impl LieGroup<3> for Rotations {
 
     #[inline]
     fn compose<T: Scalar>(a: &Rotation<T>, b: &Rotation<T>) -> Rotation<T> {
-        Rotation { w: a.w * b.w - a.u.dot(&b.u), u: b.u * a.w + a.u * b.w + cross(&a.u, &b.u) }
+        Rotation { w: a.w * b.w - dot(a.u, b.u), u: b.u * a.w + a.u * b.w + cross(&a.u, &b.u) }
     }
 
     #[inline]
@@ -113,7 +114,7 @@ impl LieGroup<3> for Rotations {
 
     #[inline]
     fn exp<T: Scalar>(xi: &SVector<T, 3>) -> Rotation<T> {
-        let c = stumpff(xi.dot(xi) * 0.25);
+        let c = stumpff(dot(xi, xi) * 0.25);
         Rotation { w: c[0], u: xi * (c[1] * 0.5) }
     }
 
@@ -121,7 +122,7 @@ impl LieGroup<3> for Rotations {
     /// angles up to pi.
     fn log<T: Scalar>(g: &Rotation<T>) -> SVector<T, 3> {
         let (w, u) = if g.w.re() < 0.0 { (-g.w, -g.u) } else { (g.w, g.u) };
-        let square = u.dot(&u);
+        let square = dot(u, u);
         let inverse = ((square + w * w).sqrt() + w).recip();
         u * (arc_tangent_ratio(square * inverse * inverse) * inverse * 4.0)
     }
@@ -148,14 +149,14 @@ impl LieGroup<3> for Rotations {
 
     #[inline]
     fn dexp<T: Scalar>(xi: &SVector<T, 3>, v: &SVector<T, 3>) -> SVector<T, 3> {
-        let c = stumpff(xi.dot(xi));
+        let c = stumpff(dot(xi, xi));
         let once = cross(xi, v);
         v - once * c[2] + cross(xi, &once) * c[3]
     }
 
     #[inline]
     fn dexp_inverse<T: Scalar>(xi: &SVector<T, 3>, v: &SVector<T, 3>) -> SVector<T, 3> {
-        let half = stumpff(xi.dot(xi) * 0.25);
+        let half = stumpff(dot(xi, xi) * 0.25);
         let once = cross(xi, v);
         v + once * T::from(0.5) + cross(xi, &once) * ((half[2] - half[3]) / (half[1] * 4.0))
     }
@@ -173,11 +174,11 @@ impl LieGroup<3> for Rotations {
     /// With `2x c_k' = c_(k-1) - k c_k`: `c_2' = c_4 - c_3/2` and `c_3' = (3 c_5 - c_4)/2`.
     #[inline]
     fn dexp_gradient<T: Scalar>(xi: &SVector<T, 3>, v: &SVector<T, 3>, mu: &SVector<T, 3>) -> SVector<T, 3> {
-        let x = xi.dot(xi);
+        let x = dot(xi, xi);
         let c = stumpff(x);
-        let (xv, xm, vm) = (xi.dot(v), xi.dot(mu), v.dot(mu));
+        let (xv, xm, vm) = (dot(xi, v), dot(xi, mu), dot(v, mu));
         let turn = cross(v, mu);
-        let along = xi.dot(&turn) * (c[3] - c[4] * 2.0) + (xm * xv - x * vm) * (c[5] * 3.0 - c[4]) - c[3] * vm * 2.0;
+        let along = dot(xi, turn) * (c[3] - c[4] * 2.0) + (xm * xv - x * vm) * (c[5] * 3.0 - c[4]) - c[3] * vm * 2.0;
         xi * along - turn * c[2] + (mu * xv + v * xm) * c[3]
     }
 
@@ -191,15 +192,15 @@ impl LieGroup<3> for Rotations {
     }
 
     fn check(g: &Rotation) -> Result<(), GroupError> {
-        let norm = (g.w * g.w + g.u.dot(&g.u)).sqrt();
+        let norm = (g.w * g.w + dot(g.u, g.u)).sqrt();
         // A NaN is not within the band.
         if (norm - 1.0).abs() <= UNIT { Ok(()) } else { Err(GroupError::NonUnitQuaternion { norm }) }
     }
 
     fn advance(g: &mut Rotation, rest: &mut Rotation, xi: &SVector<f64, 3>) {
-        let c = stumpff(xi.dot(xi) * 0.25);
+        let c = stumpff(dot(xi, xi) * 0.25);
         // exp(xi) - 1, the real part without cancellation.
-        let change = Rotation { w: -0.25 * xi.dot(xi) * c[2], u: xi * (0.5 * c[1]) };
+        let change = Rotation { w: -0.25 * dot(xi, xi) * c[2], u: xi * (0.5 * c[1]) };
         let step = Rotations::compose(g, &change);
         // The rest is turned along; its product with the change is below it by the size of the step.
         let turned = Rotations::compose(rest, &Rotation { w: 1.0 + change.w, u: change.u });
@@ -209,7 +210,7 @@ impl LieGroup<3> for Rotations {
             add_compensated(&mut g.u[k], &mut rest.u[k], step.u[k]);
         }
         // The norm is corrected to first order in its deviation from 1.
-        let excess = 0.5 * (1.0 - (g.w * g.w + g.u.dot(&g.u)));
+        let excess = 0.5 * (1.0 - (g.w * g.w + dot(g.u, g.u)));
         let (w, u) = (excess * g.w, g.u * excess);
         add_compensated(&mut g.w, &mut rest.w, w);
         for k in 0..3 {

@@ -21,4 +21,4 @@ pub use max_or_nan::{MaxAbsOrNan, MaxOrNan, max_abs_or_nan, max_or_nan};
 pub use module::{AugmentedVector, TangentVector};
 pub use regularity::Regularity;
 pub use scalar::Scalar;
-pub use vector::vector_of;
+pub use vector::{dot, vector_of};

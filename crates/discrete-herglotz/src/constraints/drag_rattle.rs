@@ -10,6 +10,7 @@ use crate::{InputError, RunSupport, SplittingScheme, State, StepError, StepFailu
 use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
+use contact_geom::numbers::dot;
 use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
@@ -215,7 +216,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
             }
         }
         let v = self.velocity(t, (&q0, &p), vary);
-        z += p.dot(&v) * half;
+        z += dot(p, v) * half;
         (_, g) = vary.constraint(&self.constraint, &q);
         let (value, force) = self.kick(t + h, &q, vary);
         p += force * half;

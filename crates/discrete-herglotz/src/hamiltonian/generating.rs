@@ -7,6 +7,7 @@ use crate::{
     InputError, Integrator, MethodInfo, PlanEntry, Problem, SplittingScheme, StepError, Stepper, StepperOptions,
 };
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
+use contact_geom::numbers::dot;
 use contact_geom::numbers::{max_abs_or_nan, max_or_nan};
 use contact_geom::support::linear;
 use contact_geom::{ChartVector, ContactHamiltonian, HamiltonianDerivatives, OfHamiltonian, PhasePoint, Scalar};
@@ -205,7 +206,7 @@ impl<H: ContactHamiltonian<N>, T: Scalar, const N: usize> Equations<'_, H, N, T>
             return Err(StepError::SigmaVanished { sigma: sigma.re() });
         }
         // The p of the arguments is p1 for type II, p0 for type III. The increment of the action may overflow.
-        let z = at.p.dot(&d.y) - value;
+        let z = dot(at.p, d.y) - value;
         if !z.re().is_finite() {
             return Err(StepError::NonFinite);
         }

@@ -1,6 +1,7 @@
 //! Modified Hamiltonians: the contact Hamiltonian of which a step is the exact flow, up to a power of the step size.
 
 use crate::{InputError, Integrator, Problem, StepError, StepperOptions};
+use contact_geom::numbers::dot;
 use contact_geom::{ChartVector, Lagrangian, PhasePoint, numbers::max_abs_or_nan};
 
 /// The largest order of an interpolated modified Hamiltonian: beyond it the differences of states are round-off.
@@ -38,7 +39,7 @@ pub fn modified_hamiltonian<const N: usize>(states: &[PhasePoint<N>], h: f64) ->
     for (j, state) in states.iter().enumerate().filter(|(j, _)| *j != middle) {
         field = field.plus(ChartVector::from(*state).minus((*here).into()).scale(weight(j) / h));
     }
-    Some(here.p.dot(&field.x) - field.z)
+    Some(dot(here.p, field.x) - field.z)
 }
 
 /// How far steps are from the flow of their modified Hamiltonian.

@@ -2,6 +2,7 @@
 
 use crate::{StepError, TypedSystem, theory::legendre_inverse};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{PhasePoint, VelocityPoint};
 
 /// The velocity, and L with its derivatives, at a state.
@@ -35,7 +36,7 @@ pub(crate) fn at_state<const N: usize>(
         if hints.forced {
             force += system.applied_force(t, &x);
         }
-        return Ok(AtState { x, l: state.p.dot(&d.y) - h, force, rate: -d.z });
+        return Ok(AtState { x, l: dot(state.p, d.y) - h, force, rate: -d.z });
     }
     let x = legendre_inverse(system, t, state, guess)?;
     let (l, g) = system.with_gradient_and_force(t, &x);

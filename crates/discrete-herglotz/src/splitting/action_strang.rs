@@ -5,6 +5,7 @@ use super::separable::SeparableForm;
 use crate::resolution::monitor::defect;
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{DiscretePoint, Dual, Lagrangian, PhasePoint, Scalar};
 
 /// The substep `C B A B C` of [`ActionSplitting`](crate::splitting::ActionSplitting) as a discrete Lagrangian of order
@@ -76,7 +77,7 @@ impl<L: Lagrangian<N>, F: ActionFlow, const N: usize> ActionStrang<L, F, N> {
         let v = self.form.velocity(&p);
         let q = from.q + v * h;
         let (next, pull) = self.form.kick(t + h, &q, self.rest.0);
-        let z = z + 0.5 * h * (p.dot(&v) + (value - self.rest.1) + (next - self.rest.1));
+        let z = z + 0.5 * h * (dot(p, v) + (value - self.rest.1) + (next - self.rest.1));
         let (change, second) = with_slope(|z| map.change(z), z);
         let pull = pull * (0.5 * h);
         let p = p + (pull + (p + pull) * second);

@@ -9,6 +9,7 @@ use crate::{
     InputError, PlanEntry, RunSupport, SplittingScheme, State, StepFailure, Stepper, UnresolvedStep,
     integration::SuspectInterval,
 };
+use contact_geom::numbers::dot;
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + gamma(t) z`.
@@ -312,7 +313,7 @@ impl<L: Lagrangian<N>, const N: usize> StepMaps<'_, '_, L, N> {
         let p = m.p.value;
         let v = self.form.velocity(&p);
         if ACTION {
-            m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * p.dot(&v));
+            m.z.add::<COMPENSATED>(|_, z| drift.damping * z + drift.lift * dot(p, v));
         }
         m.q.add::<COMPENSATED>(|i, _| drift.length * v[i]);
         // Always compensated: the round-off of the drag is the same function of p in all steps and would accumulate.

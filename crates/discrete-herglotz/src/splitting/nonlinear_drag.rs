@@ -9,6 +9,7 @@ use crate::{
     integration::SuspectInterval,
 };
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{Lagrangian, PhasePoint};
 
 /// The stepper of a splitting scheme for `L = v.Mv/2 - V(t, q) + f(z)`, with three exact flows: the kinetic part `A`,
@@ -199,7 +200,7 @@ fn run<L: Lagrangian<N>, C: ActionMap, const N: usize, const COMPENSATED: bool, 
             m.kick::<true, COMPENSATED>(stage.half);
             let p = m.p.value;
             let v: SVector<f64, N> = form.velocity(&p);
-            m.z.add::<COMPENSATED>(|_, _| stage.half * p.dot(&v));
+            m.z.add::<COMPENSATED>(|_, _| stage.half * dot(p, v));
             m.q.add::<COMPENSATED>(|i, _| stage.length * v[i]);
             let force = m.force;
             (m.value, m.force) = form.kick(t + stage.time, &m.q.value, z);

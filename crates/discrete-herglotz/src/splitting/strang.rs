@@ -5,6 +5,7 @@ use super::separable::SeparableForm;
 use crate::resolution::monitor::defect;
 use crate::{DiscreteLagrangian, DiscreteStep, InputError, StepError, solve::Solver};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, Scalar};
 
 /// The Strang splitting of `L = v.Mv/2 - V(t, q) + gamma(t) z`, kick, drift, kick, as a discrete Lagrangian of order 2:
@@ -70,7 +71,7 @@ impl<L: Lagrangian<N>, const N: usize> Strang<L, N> {
         z += 0.5 * h * value;
         p += force * (0.5 * h);
         let v = self.form.velocity(&p);
-        z += drift.damping * z + drift.lift * p.dot(&v);
+        z += drift.damping * z + drift.lift * dot(p, v);
         q += v * drift.length;
         let (value, force) = self.form.kick(t + h, &q, 0.0);
         z += 0.5 * h * value;

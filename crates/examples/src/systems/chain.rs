@@ -2,6 +2,7 @@
 
 use super::{System, between, parametric_fields};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::numbers::{Coefficient, ScalarOver};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 
@@ -68,7 +69,7 @@ impl<const N: usize> Chain<N> {
         v: &SVector<T, N>,
         z: T,
     ) -> T {
-        v.dot(v) * 0.5 - self.potential(beta, q) + z * gamma
+        dot(v, v) * 0.5 - self.potential(beta, q) + z * gamma
     }
 }
 
@@ -119,7 +120,7 @@ impl<const N: usize> System<N> for Chain<N> {
     }
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<N, T>) -> Option<T> {
-        Some(x.p.dot(&x.p) * 0.5 + self.potential(self.beta, &x.q) - x.z * self.gamma)
+        Some(dot(x.p, x.p) * 0.5 + self.potential(self.beta, &x.q) - x.z * self.gamma)
     }
 
     fn symmetries(&self) -> Vec<Symmetry<N>> {

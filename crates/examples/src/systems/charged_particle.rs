@@ -2,6 +2,7 @@
 
 use super::{System, between, parametric_fields};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::numbers::{Coefficient, ScalarOver};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 
@@ -40,7 +41,7 @@ impl ChargedParticle {
         z: T,
     ) -> T {
         let swept = q[0] * v[1] - q[1] * v[0];
-        v.dot(v) * 0.5 + swept * (b * 0.5) - q.dot(q) * (k * 0.5) + z * gamma
+        dot(v, v) * 0.5 + swept * (b * 0.5) - dot(q, q) * (k * 0.5) + z * gamma
     }
 }
 
@@ -83,7 +84,7 @@ impl System<2> for ChargedParticle {
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<2, T>) -> Option<T> {
         let (half, q, p) = (self.b * 0.5, &x.q, &x.p);
         let (vx, vy) = (p[0] + q[1] * half, p[1] - q[0] * half);
-        Some((vx * vx + vy * vy) * 0.5 + q.dot(q) * (self.k * 0.5) - x.z * self.gamma)
+        Some((vx * vx + vy * vy) * 0.5 + dot(q, q) * (self.k * 0.5) - x.z * self.gamma)
     }
 
     fn symmetries(&self) -> Vec<Symmetry<2>> {

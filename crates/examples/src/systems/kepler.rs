@@ -2,6 +2,7 @@
 
 use super::{System, between, parametric_fields};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::numbers::{Coefficient, ScalarOver};
 use contact_geom::{ChartVector, Hints, Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 
@@ -34,7 +35,7 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
 
     #[inline(always)]
     fn closed_gradient<T: Scalar>(&self, _t: T, x: &VelocityPoint<D, T>) -> Option<ChartVector<D, T>> {
-        let inverse = x.q.dot(&x.q).sqrt().recip();
+        let inverse = dot(x.q, x.q).sqrt().recip();
         let pull = inverse * inverse * inverse * -self.mu;
         Some(ChartVector { x: x.q * pull, y: x.v, z: T::from(self.gamma) })
     }
@@ -55,7 +56,7 @@ impl<const D: usize> Lagrangian<D> for Kepler<D> {
     #[inline(always)]
     fn dt_dtau<T: Scalar>(&self, q: &SVector<T, D>) -> T {
         // SIMD registers support square roots and products, but no general powers.
-        q.dot(q).sqrt().sqrt().powi(3)
+        dot(q, q).sqrt().sqrt().powi(3)
     }
 }
 
@@ -79,7 +80,7 @@ impl<const D: usize> System<D> for Kepler<D> {
     }
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<D, T>) -> Option<T> {
-        Some(x.p.dot(&x.p) * 0.5 - attraction(self.mu, &x.q) - x.z * self.gamma)
+        Some(dot(x.p, x.p) * 0.5 - attraction(self.mu, &x.q) - x.z * self.gamma)
     }
 
     fn symmetries(&self) -> Vec<Symmetry<D>> {
@@ -98,14 +99,14 @@ impl<const D: usize> Kepler<D> {
         v: &SVector<T, D>,
         z: T,
     ) -> T {
-        v.dot(v) * 0.5 + attraction(mu, q) + z * gamma
+        dot(v, v) * 0.5 + attraction(mu, q) + z * gamma
     }
 }
 
 /// The negative potential `mu / |q|`.
 #[inline(always)]
 pub(super) fn attraction<C, T: ScalarOver<C>, const D: usize>(mu: C, q: &SVector<T, D>) -> T {
-    q.dot(q).sqrt().recip() * mu
+    dot(q, q).sqrt().recip() * mu
 }
 
 /// The pericentre of an orbit of semi-major axis 1 and eccentricity 1/2 without drag; in space its plane is inclined by

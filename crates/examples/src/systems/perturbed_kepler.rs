@@ -3,6 +3,7 @@
 use super::kepler::{attraction, pericentre, sample_annulus};
 use super::{System, parametric_fields};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::numbers::{Coefficient, ScalarOver};
 use contact_geom::{Lagrangian, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
 
@@ -41,7 +42,7 @@ impl PerturbedKepler {
         v: &SVector<T, 2>,
         z: T,
     ) -> T {
-        v.dot(v) * 0.5 + attraction(mu, q) + (t * theta).sin() * z * alpha
+        dot(v, v) * 0.5 + attraction(mu, q) + (t * theta).sin() * z * alpha
     }
 }
 
@@ -80,7 +81,7 @@ impl System<2> for PerturbedKepler {
     }
 
     fn hamiltonian<T: Scalar>(&self, t: T, x: &PhasePoint<2, T>) -> Option<T> {
-        Some(x.p.dot(&x.p) * 0.5 - attraction(self.mu, &x.q) - (t * self.theta).sin() * x.z * self.alpha)
+        Some(dot(x.p, x.p) * 0.5 - attraction(self.mu, &x.q) - (t * self.theta).sin() * x.z * self.alpha)
     }
 
     fn symmetries(&self) -> Vec<Symmetry<2>> {

@@ -3,6 +3,7 @@
 use super::closed_form::{relative_exp_m1, second_relative_exp, third_relative_exp};
 use super::{System, between};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::numbers::{Coefficient, ScalarOver};
 use contact_geom::support::indexed_names;
 use contact_geom::{Lagrangian, Parametric, PhasePoint, Scalar, Structure, Symmetry, VelocityPoint};
@@ -51,7 +52,7 @@ impl<const D: usize> UniformField<D> {
         let (sigma, f, g, k) = (x.exp(), relative_exp_m1(x), second_relative_exp(x), third_relative_exp(x));
         let (q0, v0) = (&start.q, &start.v);
         let square: f64 = self.field.iter().map(|a| a * a).sum();
-        let rate = v0.dot(v0) * (0.5 * sigma * f) + self.work(q0) * f + self.work(v0) * (t * f * f);
+        let rate = dot(v0, v0) * (0.5 * sigma * f) + self.work(q0) * f + self.work(v0) * (t * f * f);
         VelocityPoint {
             q: SVector::from_fn(|i, _| q0[i] + (v0[i] * (t * f) + t * t * g * self.field[i])),
             v: SVector::from_fn(|i, _| v0[i] * sigma + t * f * self.field[i]),
@@ -79,7 +80,7 @@ impl<const D: usize> UniformField<D> {
         v: &SVector<T, D>,
         z: T,
     ) -> T {
-        v.dot(v) * 0.5 + Self::work_of(field, q) + z * gamma
+        dot(v, v) * 0.5 + Self::work_of(field, q) + z * gamma
     }
 }
 
@@ -143,7 +144,7 @@ impl<const D: usize> System<D> for UniformField<D> {
     }
 
     fn hamiltonian<T: Scalar>(&self, _t: T, x: &PhasePoint<D, T>) -> Option<T> {
-        Some(x.p.dot(&x.p) * 0.5 - self.work(&x.q) - x.z * self.gamma)
+        Some(dot(x.p, x.p) * 0.5 - self.work(&x.q) - x.z * self.gamma)
     }
 
     /// The translations along the axes on which the field has no component.
@@ -226,9 +227,9 @@ mod tests {
             let once = system.solution(t1 + t2, &start());
             let twice = system.solution(t2, &system.solution(t1, &start()));
             assert_close(&once, &twice, tolerance(gamma, t1 + t2), &format!("gamma = {gamma}"));
-            let energy = |x: &VelocityPoint<2>| x.v.dot(&x.v) * 0.5 - system.work(&x.q) - gamma * x.z;
+            let energy = |x: &VelocityPoint<2>| dot(x.v, x.v) * 0.5 - system.work(&x.q) - gamma * x.z;
             let expected = energy(&start()) * (gamma * (t1 + t2)).exp();
-            let size = expected.abs() + once.v.dot(&once.v) + system.work(&once.q).abs() + (gamma * once.z).abs();
+            let size = expected.abs() + dot(once.v, once.v) + system.work(&once.q).abs() + (gamma * once.z).abs();
             assert!((energy(&once) - expected).abs() <= tolerance(gamma, t1 + t2) * (1.0 + size), "gamma = {gamma}");
         }
     }
@@ -274,7 +275,7 @@ mod tests {
         assert!(system.symmetries().iter().all(|s| s.symmetry_defect(&system, t, &x) <= 1e-15));
         assert_eq!(UniformField::<2>::default().field, [0.0, -1.0]);
         let p = system.gradient(t, &x).y;
-        let energy = x.v.dot(&p) - system.value(t, &x.q, &x.v, x.z);
+        let energy = dot(x.v, p) - system.value(t, &x.q, &x.v, x.z);
         let Some(hamiltonian) = system.hamiltonian(t, &PhasePoint { q: x.q, p, z: x.z }) else { unreachable!() };
         assert!((energy - hamiltonian).abs() <= 8.0 * EPS);
     }

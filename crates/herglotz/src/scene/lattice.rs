@@ -8,8 +8,8 @@ use super::output::{RowTimes, of_formula};
 use super::step_control::step_control;
 use super::sum_of_terms::explain;
 use crate::runtime::{
-    AnyIntegrator, Boundary, Formula, FormulaError, InitialVelocity, Lattice, RuntimeError, SiteMotion, SiteSystem,
-    Start, StepControl, Steps, velocity_name,
+    AnyIntegrator, Boundary, Formula, InitialVelocity, Lattice, RuntimeError, SiteMotion, SiteSystem, Start,
+    StepControl, Steps, velocity_name,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;

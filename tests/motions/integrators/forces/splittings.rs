@@ -6,6 +6,7 @@ use crate::forces::Applied;
 use crate::lagrangians::{One, Two, kepler, one};
 use contact_examples::systems::{Kepler, Pendulum, QuadraticInZ};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{Force, ForceStructure, Forced, Lagrangian, PhasePoint, Scalar, Structure, VelocityPoint};
 use discrete_herglotz::{Ensemble, GaussCollocation, InputError, Integrator, Problem, SplittingScheme, Steps, Until};
 
@@ -96,7 +97,7 @@ pub struct Free;
 
 impl Lagrangian<2> for Free {
     fn value<T: Scalar>(&self, _t: T, _q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-        v.dot(v)
+        dot(v, v)
     }
     fn structure(&self) -> Structure {
         Structure { autonomous: true, z_free: true, separable: true, quadratic: true, ..Structure::default() }

@@ -5,14 +5,21 @@ use crate::invalid_input::numbers::{EXTREME, Report, fine, triples};
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
 use contact_geom::{
     DiscretePoint, Dual, PhasePoint, Scalar, VelocityPoint,
-    numbers::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, max_abs_or_nan, max_or_nan},
+    numbers::{AugmentedVector, MaxAbsOrNan, MaxOrNan, TangentVector, dot, max_abs_or_nan, max_or_nan},
     support::{linear, seed},
     vector,
 };
 
 pub const TESTS: &[InputTest] = &[
     InputTest {
-        entries: &["max_or_nan", "max_abs_or_nan", "MaxOrNan::max_or_nan", "MaxAbsOrNan::max_abs_or_nan", "vector_of"],
+        entries: &[
+            "max_or_nan",
+            "max_abs_or_nan",
+            "MaxOrNan::max_or_nan",
+            "MaxAbsOrNan::max_abs_or_nan",
+            "vector_of",
+            "dot",
+        ],
         run: maxima,
     },
     InputTest {
@@ -100,6 +107,8 @@ fn maxima(report: &mut Report) {
     for a in EXTREME {
         let x: SVector<f64, 3> = vector!(|i| if i == 1 { a } else { 0.0 });
         report.check(x[1].to_bits() == a.to_bits() && x[0] == 0.0 && x[2] == 0.0, || format!("vector_of: {x}"));
+        let (product, expected) = (dot(x, x), x[0] * x[0] + a * a + x[2] * x[2]);
+        report.check(product == expected || product.is_nan() && expected.is_nan(), || format!("dot: {product}"));
     }
 }
 

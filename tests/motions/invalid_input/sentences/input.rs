@@ -8,6 +8,7 @@ use contact_examples::systems::constrained::RigidPendulum;
 use contact_examples::systems::{CoupledInZ, Kepler, Pendulum};
 use contact_geom::constraints::Constraint;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::dot;
 use contact_geom::{
     ContactHamiltonian, DiscretePoint, Forced, Hints, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure,
     VelocityDrag, VelocityPoint,
@@ -46,7 +47,7 @@ pub struct Ridge;
 impl Lagrangian<2> for Ridge {
     const HINTS: Hints = Hints { switching_functions: true, ..Hints::NONE };
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 2>, v: &SVector<T, 2>, _z: T) -> T {
-        v.dot(v) * 0.5 - q[0].abs()
+        dot(v, v) * 0.5 - q[0].abs()
     }
     fn switching_functions(&self, _t: f64, x: &VelocityPoint<2>, values: &mut Vec<f64>) {
         values.push(x.q[0]);
@@ -55,7 +56,7 @@ impl Lagrangian<2> for Ridge {
 
 impl Constraint<2, 1> for Ridge {
     fn value<T: Scalar>(&self, q: &SVector<T, 2>) -> SVector<T, 1> {
-        [q.dot(q) - 1.0].into()
+        [dot(q, q) - 1.0].into()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The derivatives of contact Hamiltonians.
 
+use crate::numbers::dot;
 use crate::support::{KernelDual, seed};
 use crate::{ChartVector, ContactHamiltonian, Dual, Hessian, PhasePoint, Scalar, vector};
 use nalgebra::{SMatrix, SVector};
@@ -17,7 +18,7 @@ pub trait HamiltonianDerivatives<const N: usize>: ContactHamiltonian<N> {
     #[inline(always)]
     fn contact_field<T: Scalar>(&self, t: T, x: &PhasePoint<N, T>) -> ChartVector<N, T> {
         let (h, d) = self.with_gradient(t, x);
-        ChartVector { x: d.y, y: -d.x - x.p * d.z, z: x.p.dot(&d.y) - h }
+        ChartVector { x: d.y, y: -d.x - x.p * d.z, z: dot(x.p, d.y) - h }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::linear;
 use crate::{ContactHamiltonian, HamiltonianDerivatives, PhasePoint, Scalar, VelocityPoint, numbers::max_abs_or_nan};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
 
 /// The largest number of iterations of Newton's method over real numbers.
@@ -37,8 +37,19 @@ pub fn momentum<H: ContactHamiltonian<N> + ?Sized, T: Scalar, const N: usize>(
     t: T,
     x: &VelocityPoint<N, T>,
 ) -> Result<SVector<T, N>, NoMomentum> {
-    let (time, q, z) = (t.re(), x.q.map(|e| e.re()), x.z.re());
-    let v = x.v.map(|e| e.re());
+    let time = t.re();
+    let real = VelocityPoint { q: x.q.map(|e| e.re()), v: x.v.map(|e| e.re()), z: x.z.re() };
+    let at = real_momentum(hamiltonian, time, &real)?;
+    lift(hamiltonian, time, &at, |p| hamiltonian.with_gradient(t, &PhasePoint { q: x.q, p: *p, z: x.z }).1.y - x.v)
+}
+
+/// The same over real numbers: the code is compiled once, and not for each type of scalar.
+fn real_momentum<H: ContactHamiltonian<N> + ?Sized, const N: usize>(
+    hamiltonian: &H,
+    time: f64,
+    x: &VelocityPoint<N>,
+) -> Result<PhasePoint<N>, NoMomentum> {
+    let VelocityPoint { q, v, z } = *x;
     let off = |p: &SVector<f64, N>| hamiltonian.with_gradient(time, &PhasePoint { q, p: *p, z }).1.y - v;
     let size = |x: &SVector<f64, N>| max_abs_or_nan(x.iter().copied());
     let matrix = |p: &SVector<f64, N>| hamiltonian.hessian(time, &PhasePoint { q, p: *p, z }).vv;
@@ -76,9 +87,7 @@ pub fn momentum<H: ContactHamiltonian<N> + ?Sized, T: Scalar, const N: usize>(
     if !converged {
         return Err(NoMomentum::NotConverged { residual: size(&residual) });
     }
-    lift(hamiltonian, time, &PhasePoint { q, p, z }, |p| {
-        hamiltonian.with_gradient(t, &PhasePoint { q: x.q, p: *p, z: x.z }).1.y - x.v
-    })
+    Ok(PhasePoint { q, p, z })
 }
 
 /// The momentum over a scalar with differentials, from its real part: corrections by `H_pp^-1` until the residual
@@ -89,13 +98,7 @@ pub(super) fn lift<H: ContactHamiltonian<N> + ?Sized, T: Scalar, const N: usize>
     at: &PhasePoint<N>,
     residual: impl Fn(&SVector<T, N>) -> SVector<T, N>,
 ) -> Result<SVector<T, N>, NoMomentum> {
-    let w = hamiltonian.hessian(t, at).vv;
-    let mut inverse = nalgebra::SMatrix::<f64, N, N>::zeros();
-    for j in 0..N {
-        let mut unit = SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == j)));
-        linear::solve(&mut w.clone_owned(), &mut unit).map_err(|e| NoMomentum::Singular { pivot: e.pivot })?;
-        inverse.set_column(j, &unit);
-    }
+    let inverse = inverse(hamiltonian, t, at)?;
     let mut lifted = at.p.map(T::from);
     for _ in 0..MAX_CORRECTIONS {
         let residual = residual(&lifted);
@@ -108,4 +111,20 @@ pub(super) fn lift<H: ContactHamiltonian<N> + ?Sized, T: Scalar, const N: usize>
         }
     }
     Ok(lifted)
+}
+
+/// The inverse of `H_pp`.
+fn inverse<H: ContactHamiltonian<N> + ?Sized, const N: usize>(
+    hamiltonian: &H,
+    t: f64,
+    at: &PhasePoint<N>,
+) -> Result<SMatrix<f64, N, N>, NoMomentum> {
+    let w = hamiltonian.hessian(t, at).vv;
+    let mut inverse = SMatrix::<f64, N, N>::zeros();
+    for j in 0..N {
+        let mut unit = SVector::<f64, N>::from_fn(|i, _| f64::from(u8::from(i == j)));
+        linear::solve(&mut w.clone_owned(), &mut unit).map_err(|e| NoMomentum::Singular { pivot: e.pivot })?;
+        inverse.set_column(j, &unit);
+    }
+    Ok(inverse)
 }

@@ -1,6 +1,7 @@
 //! The Lagrangian of a contact Hamiltonian.
 
 use crate::dynamics::contact_hamiltonian::parametric::lagrangian_at;
+use crate::numbers::dot;
 use crate::support::linear;
 use crate::{
     ChartVector, ContactHamiltonian, HamiltonianDerivatives, Hessian, Hints, Lagrangian, Parametric,
@@ -57,7 +58,7 @@ impl<const N: usize, H: ContactHamiltonian<N>> Lagrangian<N> for OfHamiltonian<H
 
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let x = phase_point(&self.0, t, &VelocityPoint { q: *q, v: *v, z });
-        x.p.dot(v) - self.0.value(t, &x.q, &x.p, x.z)
+        dot(x.p, v) - self.0.value(t, &x.q, &x.p, x.z)
     }
 
     fn structure(&self) -> Structure {
@@ -71,7 +72,7 @@ impl<const N: usize, H: ContactHamiltonian<N>> Lagrangian<N> for OfHamiltonian<H
     fn closed_with_gradient<T: Scalar>(&self, t: T, x: &VelocityPoint<N, T>) -> Option<(T, ChartVector<N, T>)> {
         let state = phase_point(&self.0, t, x);
         let (h, d) = self.0.with_gradient(t, &state);
-        Some((state.p.dot(&x.v) - h, ChartVector { x: -d.x, y: state.p, z: -d.z }))
+        Some((dot(state.p, x.v) - h, ChartVector { x: -d.x, y: state.p, z: -d.z }))
     }
 
     /// With `K = H_pp^-1`: `L_vv = K`, `L_vq = -K H_pq`, `L_vz = -K H_pz`, `L_qq = H_qp K H_pq - H_qq` and so on.

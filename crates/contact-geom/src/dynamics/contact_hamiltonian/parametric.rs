@@ -1,5 +1,6 @@
 //! Parameters of contact Hamiltonians, with respect to which motions can be differentiated.
 
+use crate::numbers::dot;
 use crate::{ContactHamiltonian, PhasePoint, Scalar, VelocityPoint};
 use crate::{dynamics::contact_hamiltonian::momentum::lift, momentum, support::KernelDual};
 use nalgebra::SVector;
@@ -86,7 +87,7 @@ pub(super) fn lagrangian_at<H: ParametricHamiltonian<N>, T: Scalar, const N: usi
     };
     let state = PhasePoint { q: real.q, p, z: real.z };
     match lift(&of_values, t.re(), &state, |p| velocity(p) - x.v) {
-        Ok(p) => p.dot(&x.v) - hamiltonian.value_at(theta, t, &x.q, &p, x.z),
+        Ok(p) => dot(p, x.v) - hamiltonian.value_at(theta, t, &x.q, &p, x.z),
         Err(_) => T::from(f64::NAN),
     }
 }

@@ -16,6 +16,7 @@ use crate::numbers::registers::{MAX_STAGES, Stages, blocks};
 use crate::system::caught;
 use crate::{Point, System};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{
     ChartVector, Derivatives, Lagrangian, PhasePoint, Scalar, ScalarSystem, Slopes, VelocityPoint, vector,
 };
@@ -328,5 +329,5 @@ fn of_hamiltonian<S: Simd, L: Lagrangian<N>, const N: usize>(
     if const { L::HINTS.forced } {
         force += lagrangian.applied_force(t, &VelocityPoint { v: d.y, ..*x });
     }
-    (p.dot(&d.y) - h, ChartVector { x: force, y: d.y, z: -d.z })
+    (dot(p, d.y) - h, ChartVector { x: force, y: d.y, z: -d.z })
 }

@@ -22,6 +22,7 @@ use crate::{
     InputError, PlanEntry, Problem, RunSupport, State, StepDetails, StepError, StepFailure, Stepper, UnresolvedStep,
     Vector,
 };
+use contact_geom::numbers::dot;
 use contact_geom::{Lagrangian, Structure};
 
 /// A stepper of contact Gauss collocation with variable steps: the steps are equal in the time tau of the
@@ -92,7 +93,7 @@ impl<'a> TransformedStepper<'a> {
         if !(rate > 0.0 && rate.is_finite()) {
             return Err(InputError::TimeTransformation { rate });
         }
-        let energy = start.v.dot(&state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
+        let energy = dot(start.v, state.p) - lagrangian.value(t0, &start.q, &start.v, start.z);
         if !energy.is_finite() {
             return Err(InputError::FirstStep(StepError::NonFinite));
         }

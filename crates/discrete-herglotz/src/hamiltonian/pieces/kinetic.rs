@@ -3,6 +3,7 @@
 use super::ContactPiece;
 use crate::hamiltonian::ContactIncrement;
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{ContactHamiltonian, HamiltonianDerivatives, PhasePoint, Scalar};
 
 /// A piece `T(t, p)`, given as a contact Hamiltonian that depends on the momenta alone. The momenta are constant along
@@ -39,7 +40,7 @@ impl<H: ContactHamiltonian<N>, const N: usize> ContactPiece<N> for Kinetic<H> {
     #[inline]
     fn change<T: Scalar>(&self, tau: &f64, t: f64, x: &PhasePoint<N, T>) -> ContactIncrement<N, T> {
         let (h, d) = self.0.with_gradient(T::from(t), x);
-        let z = (x.p.dot(&d.y) - h) * *tau;
+        let z = (dot(x.p, d.y) - h) * *tau;
         ContactIncrement { q: d.y.map(|e| e * *tau), z, ..ContactIncrement::zero() }
     }
 }

@@ -3,6 +3,7 @@
 use super::ContactPiece;
 use crate::hamiltonian::ContactIncrement;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::dot;
 use contact_geom::{ContactHamiltonian, Dual, PhasePoint, Scalar, numbers::AugmentedVector, support::linear};
 
 /// The flow of a vector field `q' = X(t, q, z)`, `z' = g(t, q, z)` on Q x R, at each fixed time t.
@@ -55,7 +56,7 @@ pub struct Prolonged<F>(pub F);
 impl<F: PointFlow<N>, const N: usize> ContactHamiltonian<N> for Prolonged<F> {
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
         let (x, g) = self.0.field(t, q, z);
-        p.dot(&x) - g
+        dot(p, x) - g
     }
 }
 

@@ -4,6 +4,7 @@ use super::ContactPiece;
 use crate::hamiltonian::ContactIncrement;
 use crate::hamiltonian::matrix_exponential::exponential_minus_one;
 use contact_geom::nalgebra::{DMatrix, SMatrix, SVector};
+use contact_geom::numbers::dot;
 use contact_geom::{ContactHamiltonian, PhasePoint, Scalar};
 
 /// The piece `H = q . A q/2 + q . B p + p . C p/2 - gamma z` with constant matrices: small oscillations with drag, with
@@ -52,7 +53,7 @@ fn times<T: Scalar, const N: usize>(m: &SMatrix<f64, N, N>, x: &SVector<T, N>) -
 impl<const N: usize> ContactHamiltonian<N> for Quadratic<N> {
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
         let (of_q, of_p) = (times(&self.qq, q), times(&self.pp, p));
-        (q.dot(&of_q) + p.dot(&of_p)) * 0.5 + q.dot(&times(&self.qp, p)) - z * self.gamma
+        (dot(q, of_q) + dot(p, of_p)) * 0.5 + q.dot(&times(&self.qp, p)) - z * self.gamma
     }
 }
 

@@ -2,6 +2,7 @@
 
 use contact_geom::constraints::Distribution;
 use contact_geom::nalgebra::{SMatrix, SVector};
+use contact_geom::numbers::dot;
 use contact_geom::{Lagrangian, Scalar, Structure};
 
 /// A blade of unit mass and unit moment of inertia at `(q0, q1)` in the direction `q2`, on a plane that descends along
@@ -21,7 +22,7 @@ pub struct KnifeEdge {
 impl Lagrangian<3> for KnifeEdge {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 3>, v: &SVector<T, 3>, z: T) -> T {
-        v.dot(v) * 0.5 + q[0] * self.slope + z * self.gamma
+        dot(v, v) * 0.5 + q[0] * self.slope + z * self.gamma
     }
 
     fn structure(&self) -> Structure {

@@ -2,6 +2,7 @@
 
 use contact_geom::constraints::Constraint;
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{Lagrangian, Scalar, Structure};
 
 /// A point of unit mass on the unit sphere of R^N under gravity along the last axis, with linear drag:
@@ -22,7 +23,7 @@ impl<const N: usize> Lagrangian<N> for RigidPendulum<N> {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, v: &SVector<T, N>, z: T) -> T {
         let height = q.iter().last().map_or(T::zero(), |y| *y);
-        v.dot(v) * 0.5 - height * self.gravity + z * self.gamma
+        dot(v, v) * 0.5 - height * self.gravity + z * self.gamma
     }
 
     fn structure(&self) -> Structure {
@@ -39,6 +40,6 @@ impl<const N: usize> Lagrangian<N> for RigidPendulum<N> {
 
 impl<const N: usize> Constraint<N, 1> for RigidPendulum<N> {
     fn value<T: Scalar>(&self, q: &SVector<T, N>) -> SVector<T, 1> {
-        SVector::from([q.dot(q) - T::one()])
+        SVector::from([dot(q, q) - T::one()])
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Objective;
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar};
 
 /// The kinetic energy K of [`Bregman`], the convex conjugate of its distance function h.
@@ -23,8 +24,8 @@ impl Kinetic {
     #[inline(always)]
     pub fn energy<T: Scalar, const N: usize>(&self, p: &SVector<T, N>) -> T {
         match self {
-            Kinetic::Quadratic => p.dot(p) * 0.5,
-            Kinetic::Relativistic { speed, mass } => (p.dot(p) + (mass * speed).powi(2)).sqrt() * *speed,
+            Kinetic::Quadratic => dot(p, p) * 0.5,
+            Kinetic::Relativistic { speed, mass } => (dot(p, p) + (mass * speed).powi(2)).sqrt() * *speed,
         }
     }
 
@@ -80,7 +81,7 @@ impl<F> Bregman<F> {
         F: Objective<N>,
     {
         let excess = self.objective.value(&x.q) - self.objective.value(minimum);
-        let divergence = self.kinetic.distance(minimum) + self.kinetic.energy(&x.p) - x.p.dot(minimum);
+        let divergence = self.kinetic.distance(minimum) + self.kinetic.energy(&x.p) - dot(x.p, minimum);
         divergence + self.scale * t.powi(i32::from(self.power)) * excess
     }
 }
@@ -89,7 +90,7 @@ impl<F: Objective<N>, const N: usize> ContactHamiltonian<N> for Bregman<F> {
     #[inline(always)]
     fn value<T: Scalar>(&self, t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
         let weight = t.powi(i32::from(self.power)) * self.scale;
-        let energy = self.kinetic.energy(p) - p.dot(q) + self.objective.value(q) * weight + z;
+        let energy = self.kinetic.energy(p) - dot(p, q) + self.objective.value(q) * weight + z;
         energy / t * f64::from(self.power)
     }
 

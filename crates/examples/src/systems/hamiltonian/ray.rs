@@ -1,6 +1,7 @@
 //! Rays of light.
 
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar};
 
 /// A medium by its index of refraction n, with rays in closed form.
@@ -50,7 +51,7 @@ impl<const N: usize> Medium<N> {
                 let r = (1..N).fold(T::zero(), |sum, i| sum + q[i] * q[i]);
                 (-r * (alpha * alpha) + 1.0).sqrt() * *axis
             }
-            Medium::FishEye { centre, radius } => (q.dot(q) / (radius * radius) + 1.0).recip() * *centre,
+            Medium::FishEye { centre, radius } => (dot(q, q) / (radius * radius) + 1.0).recip() * *centre,
         }
     }
 }
@@ -80,7 +81,7 @@ impl<const N: usize> Ray<N> {
 impl<const N: usize> ContactHamiltonian<N> for Ray<N> {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, p: &SVector<T, N>, _z: T) -> T {
-        p.dot(p).sqrt() / self.medium.index(q)
+        dot(p, p).sqrt() / self.medium.index(q)
     }
 
     fn structure(&self) -> HamiltonianStructure {

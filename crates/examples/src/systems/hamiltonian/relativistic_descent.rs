@@ -2,6 +2,7 @@
 
 use super::Objective;
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{ContactHamiltonian, HamiltonianStructure, PhasePoint, Scalar};
 
 /// Relativistic gradient descent with momentum: `H = c sqrt(|p|^2 + m^2 c^2) + f(q) - gamma z`, `gamma < 0`.
@@ -31,7 +32,7 @@ impl<F> RelativisticDescent<F> {
 impl<F: Objective<N>, const N: usize> ContactHamiltonian<N> for RelativisticDescent<F> {
     #[inline(always)]
     fn value<T: Scalar>(&self, _t: T, q: &SVector<T, N>, p: &SVector<T, N>, z: T) -> T {
-        let kinetic = (p.dot(p) + (self.mass * self.speed).powi(2)).sqrt() * self.speed;
+        let kinetic = (dot(p, p) + (self.mass * self.speed).powi(2)).sqrt() * self.speed;
         kinetic + self.objective.value(q) - z * self.gamma
     }
 

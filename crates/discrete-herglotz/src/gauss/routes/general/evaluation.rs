@@ -9,6 +9,7 @@ use crate::numbers::lanes::Lanes;
 use crate::numbers::pair::{Registers, over_registers, register};
 use crate::numbers::registers::{Stages, blocks};
 use contact_geom::nalgebra::SVector;
+use contact_geom::numbers::dot;
 use contact_geom::{ChartVector, Derivatives, Lagrangian, VelocityPoint, support::KernelDual, vector};
 use pulp::Simd;
 
@@ -52,7 +53,7 @@ impl<const N: usize, const TRANSFORMED: bool> Iteration<'_, N, TRANSFORMED> {
                 q
             });
             let KernelDual { re: g, d: slope } = lagrangian.dt_dtau(&q);
-            let energy = point.v.dot(&d.y) - re;
+            let energy = dot(point.v, d.y) - re;
             let extended = energy.mul_add(one_minus_rho_stages, energy + self.p_t);
             let of_transformed: SVector<_, N> = vector!(|i| slope[i] * extended * -weight);
             weight *= g;
