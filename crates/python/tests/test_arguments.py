@@ -213,7 +213,12 @@ CASES = {
     "ensemble_value_and_grad": (
         hz.ensemble_value_and_grad("x + x'"),
         MANY | dict(t=1.0),
-        ENSEMBLE | dict(t=1.1, observe=NO_ROWS["observe"], progress=NO_ROWS["progress"], events=Changed(BALL, RESET), accuracy=Changed(1e-3, dict(t=50.0))),
+        ENSEMBLE
+        | dict(
+            H=Refused("p_x^2/2 + x^2", "not computed for a Hamiltonian", HAMILTONIAN | dict(p0=[[0.5], [0.0]])),
+            constraints=Refused("x^2 + y^2 = 1", "not computed with constraints", PENDULUM | dict(q0=[PENDULUM["q0"]], v0=[PENDULUM["v0"]])),
+        )
+        | dict(t=1.1, observe=NO_ROWS["observe"], progress=NO_ROWS["progress"], events=Changed(BALL, RESET), accuracy=Changed(1e-3, dict(t=50.0))),
     ),
     "ensemble_value_and_grad()": (lambda loss: hz.ensemble_value_and_grad(loss)(**MANY), dict(loss="x"), dict(loss="x^2")),
     "system": (

@@ -170,7 +170,8 @@ def run_section(file, title):
 def test_the_section_of_the_documentation():
     names = run_section("python.md", "## Derivatives of motions")
     close(names["sol"].sensitivity("gamma").q[-1], [225.1450713918], 1e-11)
-    close(names["fit"].x, (-0.2, 1.7, 1.0), 1e-7)
+    # That of the bounces, of times with six digits.
+    close(names["fit"].x, (0.8, 9.81), 1e-5)
     found = names["exponents"]
     assert abs(found.pairs[0].sum() - found.rate) <= 1e-12 and found.pairing_defect <= 1e-12
     assert names["values"].shape == (100,) and names["slopes_of_members"].parameters["gamma"].shape == (100,)

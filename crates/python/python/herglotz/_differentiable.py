@@ -27,7 +27,8 @@ class DifferentiableMotion:
                 f"`{min(refused)}` cannot be given here: a differentiable motion is one of a Lagrangian from q0, v0 and z0 "
                 "with rows at `t`"
             )
-        refuse_of_rows(options, "the rows have q, v and z at the times `t`", "observe", "every", "conformal_factor", "estimate")
+        refused = "observe", "every", "conformal_factor", "estimate", "exact", "progress", "callback"
+        refuse_of_rows(options, "the rows have q, v and z at the times `t`", *refused)
         options = {name: value for name, value in options.items() if value is not None}
         self.threads = options.pop("threads", None)
         named = {name: options.pop(name) for name in _OF_SYSTEM if name in options}
