@@ -6,12 +6,14 @@ does one that has no effect.
 
 import importlib
 import inspect
+from pathlib import Path
 from typing import NamedTuple
 
 import herglotz as hz
 import numpy as np
 import pytest
 
+SCENES = Path(__file__).parents[3] / "scenes"
 L, COORDINATES = "x'^2/2 - k*x^2/2 + gamma*z", ["x"]
 PARAMETERS = {"k": 1.0, "gamma": -0.1}
 DRIVE = hz.table([0.0, 0.4, 1.0], [0.0, 1.0, -1.0])
@@ -319,6 +321,11 @@ CASES = {
             inertia=(1.5, 2, 3), step=0.05, steps=20,to=(np.cos(0.5), np.sin(0.5), 0.0, 0.0), integrator="gauss_2", omega=Refused((0.0, 0.0), "`omega` has the shape")),
     ),
     "rigid_bodies": (hz.rigid_bodies, BODY | dict(omega=[BODY["omega"]] * 2), OF_BODY | dict(omega=[(1, 0.5, 0.3)] * 2, threads=Refused(0, "the number of threads is 0"))),
+    "run": (
+        hz.run,
+        dict(scene=SCENES / "pendulum.toml"),
+        WATCH | dict(scene=SCENES / "field.toml", changes={"gamma": -0.2}),
+    ),
     "Event": (
         hz.Event,
         dict(when="x"),

@@ -1,4 +1,5 @@
 from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
 from typing import Any, Literal, NamedTuple, TypeAlias, overload
 
 import numpy as np
@@ -647,6 +648,14 @@ def rigid_body(
     callback: Callable[[RigidBodySolution], Any] | None = None,
     callback_interval: float = 1.0,
 ) -> RigidBodySolution: ...
+def run(
+    scene: str | PathLike[str],
+    changes: Mapping[str, float | str] | None = None,
+    *,
+    progress: bool = False,
+    callback: Callable[[Any], Any] | None = None,
+    callback_interval: float = 1.0,
+) -> Any: ...
 def rigid_body_between(
     inertia: ArrayLike,
     *,

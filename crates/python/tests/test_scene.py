@@ -1,0 +1,79 @@
+"""Scene files; that their rows are those of the program is checked where both are there, by .ci/scenes_agree."""
+
+from pathlib import Path
+
+import herglotz as hz
+import numpy as np
+import pytest
+
+pytest.importorskip("tomllib")
+SCENES = Path(__file__).parents[3] / "scenes"
+
+PENDULUM = """
+[system]
+coordinates = ["theta"]
+lagrangian = "theta'^2/2 + cos(theta) + gamma*z"
+parameters = { gamma = -0.1 }
+[start]
+theta = 1.0
+"theta'" = 0.0
+[run]
+time = 10.0
+accuracy = 1e-10
+[want]
+rows = { every = 0.5, columns = ["t", "theta", "twice = 2*theta", "sigma"] }
+events = [{ when = "theta", direction = "rising" }]
+"""
+
+
+def written(folder, text):
+    file = folder / "scene.toml"
+    file.write_text(text)
+    return file
+
+
+def test_a_scene_is_the_call_of_solve(tmp_path):
+    sol = hz.run(written(tmp_path, PENDULUM), {"gamma": -0.2, "start.theta": 0.5, "run.time": 5.0})
+    expected = hz.solve("theta'^2/2 + cos(theta) + gamma*z", [0.5], [0.0], np.arange(11) / 2, coordinates=["theta"],
+                        parameters={"gamma": -0.2}, accuracy=1e-10, events=hz.Event("theta", "rising"))  # fmt: skip
+    assert (sol["theta"] == expected["theta"]).all() and (sol["twice"] == 2 * sol["theta"]).all()
+    assert (sol.events[0].t == expected.events[0].t).all() and abs(sol["sigma"] - np.exp(-0.2 * sol.t)).max() < 1e-14
+    # Everything of a solution is there.
+    assert sol.resume(6.0).success and sol.sensitivity("gamma").q.shape == (11, 1)
+
+
+@pytest.mark.parametrize("scene", sorted(SCENES.glob("*.toml")), ids=lambda scene: scene.stem)
+def test_every_scene_of_the_repository_runs(scene):
+    sol = hz.run(scene)
+    assert sol.found if isinstance(sol, hz.Path) else sol.success
+
+
+def test_values_of_the_literature():
+    body = hz.run(SCENES / "free_body.toml")
+    assert abs(body.Pi[-1] - [0.328817081371932892, -0.494159614067396359, -0.231714161269102468]).max() < 1e-12
+    found = hz.run(SCENES / "containers.toml")
+    assert abs(found.q[-1, 0] - 1.16581228326) < 1e-9 and abs(found["E1"][-1] - 2.63142893086) < 1e-9
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (("[run]", "[walk]"), "unknown table `walk`"),
+        (("time =", "tme ="), r"unknown name `tme` in \[run\]"),
+        (("theta = 1.0\n", "phi = 1.0\n"), r"unknown name `phi` in \[start\]"),
+        (("theta = 1.0\n", ""), r"\[start\] has no `theta`"),
+        (("cos(theta)", "cos(teta)"), "unknown name `teta`"),
+        (("[system]", "[system"), "scene.toml"),
+        (("lagrangian =", "H ="), r"unknown name `H` in \[system\]"),
+    ],
+)
+def test_what_is_wrong_with_a_scene_is_said(tmp_path, change, message):
+    assert change[0] in PENDULUM
+    with pytest.raises(ValueError, match=message):
+        hz.run(written(tmp_path, PENDULUM.replace(*change)))
+
+
+@pytest.mark.parametrize("name", ["start.phi", "run.speed", "gama", "want.rows"])
+def test_unknown_changes_are_refused(tmp_path, name):
+    with pytest.raises(ValueError, match=name.rpartition(".")[2] if "." not in name else f"unknown name `({name}|phi)`"):
+        hz.run(written(tmp_path, PENDULUM), {name: 1.0})
