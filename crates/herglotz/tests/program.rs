@@ -351,7 +351,7 @@ fn scenes_run() {
         assert!(Path::new(REPOSITORY).join(format!("docs/scenes/{name}.svg")).exists(), "{name}");
         names.push(name);
     }
-    assert_eq!(names.len(), 30, "{names:?}");
+    assert_eq!(names.len(), 31, "{names:?}");
     // The results of two scenes: a momentum that decays with the conformal factor, and a conformal factor in closed
     // form.
     let kept = column(&at.read("kepler/rows.csv"), "exp(-gamma*t)*(x*y' - y*x')");
