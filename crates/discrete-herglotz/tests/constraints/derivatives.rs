@@ -163,9 +163,13 @@ fn derivatives_that_are_not_implemented_are_refused() {
     let tangent = problem.by(by).steps(Steps::Count(4)).tangent(&[Variable::Action], Until::Time(0.1)).err().unwrap();
     assert!(matches!(tangent, SensitivityError::UnderConstraints { what: "derivatives", .. }), "{tangent}");
     assert!(tangent.to_string().contains("lagrange_d_alembert_midpoint_by_strang"), "{tangent}");
-    let rattle = Constrained::<_, 1>::new(Circle, METHODS[0]);
-    let exponents = problem.by(rattle).steps(Steps::Count(4)).lyapunov_exponents(Until::Time(0.1)).err().unwrap();
+    let by = LagrangeDAlembert::<_, 1>::new(Circle, SplittingScheme::STRANG);
+    let exponents = problem.by(by).steps(Steps::Count(4)).lyapunov_exponents(Until::Time(0.1)).err().unwrap();
     assert!(matches!(exponents, SensitivityError::UnderConstraints { what: "Lyapunov exponents", .. }), "{exponents}");
+    // Those under a constraint on positions are of the three directions that it leaves.
+    let rattle = Constrained::<_, 1>::new(Circle, METHODS[0]);
+    let found = problem.by(rattle).steps(Steps::Count(4)).lyapunov_exponents(Until::Time(0.1)).unwrap();
+    assert_eq!((found.exponents.len(), found.pairs.len()), (3, 0));
 }
 
 /// Under an integrable distribution the nonholonomic motion is that under the constraint, up to the orders of the
