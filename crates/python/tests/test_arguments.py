@@ -285,7 +285,7 @@ CASES = {
         | OF_SYSTEM
         | dict(
             L="x'^2/2 - k*x^2/2 + gamma*z/2", t=0.3, breaks=[0.1], method=hz.method(trapezoidal, 1),
-            constraints=Refused("x = y", "not computed with constraints", dict(PENDULUM)), friction={"x": 0.2},
+            friction={"x": 0.2},
         ),
     ),
     "method": (run_by, dict(function=trapezoidal, order=1), dict(function=twice, order=2, name="other", symmetric=True)),

@@ -92,12 +92,7 @@ def test_steps_with_constraints_are_contact():
 
 def test_what_is_not_computed_with_constraints():
     of = hz.system(**TEXT, parameters={"g": 9.81}, constraints="x^2 + y^2 = 1")
-    sol = hz.solve(of, *START, 1.0, integrator="gauss_2", steps=10)
-    for call in (
-        lambda: hz.path(of, [1.0, 0.0], [0.0, 1.0], 1.0, steps=10),
-        lambda: sol.lyapunov_exponents(),
-    ):
-        with pytest.raises(ValueError, match="not computed with constraints"):
-            call()
+    with pytest.raises(ValueError, match="not computed with constraints"):
+        hz.path(of, [1.0, 0.0], [0.0, 1.0], 1.0, steps=10)
     with pytest.raises(ValueError, match="RATTLE"):
         hz.solve(of, *START, 1.0, integrator="midpoint", steps=10)
