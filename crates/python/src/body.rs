@@ -191,6 +191,19 @@ fn motion_of(
     })
 }
 
+/// The body and the motion of a request, which the signals interrupt.
+fn interruptible(
+    body: &BodyRequest<'_>,
+    start: &StartRequest<'_>,
+    (t, every): (&Bound<'_, PyAny>, Option<usize>),
+    way: WayRequest<'_>,
+    events: Vec<EventRequest>,
+) -> PyResult<(Body, BodyMotion, Signals)> {
+    let (body, signals) = (body_of(body)?, Signals::new());
+    let motion = motion_of(start, crate::motion::times(t)?, every, step_control(way)?, events)?;
+    Ok((body, BodyMotion { interrupt: Some(signals.interrupt()), ..motion }, signals))
+}
+
 /// A matrix in the order of its rows.
 fn by_rows(py: Python<'_>, found: &herglotz_runtime::DMatrix<f64>) -> PyResult<Py<PyArray2<f64>>> {
     matrix(py, found.transpose().as_slice().to_vec(), found.ncols())
@@ -235,10 +248,7 @@ pub fn run_rigid_body(
     sensitivity: bool,
     watch: GivenWatch,
 ) -> PyResult<BodyRecord> {
-    let body = body_of(&body)?;
-    let signals = Signals::new();
-    let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
-    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
+    let (body, motion, signals) = interruptible(&body, &start, (&t, every), way, events)?;
     let watch = Watch::of(watch);
     let mut kept = Kept { rows: Vec::new(), crossings: Vec::new(), signals: signals.clone(), watch };
     let outcome: Result<BodyOutcome, RuntimeError> = py.detach(|| body.run(&motion, &mut kept));
@@ -277,9 +287,7 @@ pub fn plan_rigid_body(
     way: WayRequest<'_>,
     events: Vec<EventRequest>,
 ) -> PyResult<(String, String, f64, usize, Option<f64>)> {
-    let (body, signals) = (body_of(&body)?, Signals::new());
-    let motion = motion_of(&start, crate::motion::times(&t)?, every, step_control(way)?, events)?;
-    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
+    let (body, motion, signals) = interruptible(&body, &start, (&t, every), way, events)?;
     let plan = py.detach(|| body.plan(&motion));
     if let Some(raised) = signals.take() {
         return Err(raised);
@@ -298,9 +306,8 @@ pub fn check_rigid_body(
     way: WayRequest<'_>,
     places: Bound<'_, PyAny>,
 ) -> PyResult<Checked> {
-    let (body, signals, places) = (body_of(&body)?, Signals::new(), whole("places", &places, 1)?);
-    let motion = motion_of(&start, crate::motion::times(&t)?, None, step_control(way)?, Vec::new())?;
-    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
+    let places = whole("places", &places, 1)?;
+    let (body, motion, signals) = interruptible(&body, &start, (&t, None), way, Vec::new())?;
     let found = py.detach(|| body.check(&motion, places));
     match signals.take() {
         Some(raised) => Err(raised),
@@ -318,10 +325,7 @@ pub fn rigid_body_between(
     way: WayRequest<'_>,
     to: Bound<'_, PyAny>,
 ) -> PyResult<[f64; 3]> {
-    let body = body_of(&body)?;
-    let signals = Signals::new();
-    let motion = motion_of(&start, crate::motion::times(&t)?, None, step_control(way)?, Vec::new())?;
-    let motion = BodyMotion { interrupt: Some(signals.interrupt()), ..motion };
+    let (body, motion, signals) = interruptible(&body, &start, (&t, None), way, Vec::new())?;
     let to = numbers("to", &to)?;
     let count = to.len();
     let to = <[f64; 4]>::try_from(to)

@@ -63,6 +63,8 @@ def test_values_of_the_literature():
         (("theta = 1.0\n", "phi = 1.0\n"), r"unknown name `phi` in \[start\]"),
         (("theta = 1.0\n", ""), r"\[start\] has no `theta`"),
         (("cos(theta)", "cos(teta)"), "unknown name `teta`"),
+        (("direction =", "way ="), "unknown name `way` in an event"),
+        (("every =", "each ="), "unknown name `each` in `rows`"),
         (("[system]", "[system"), "scene.toml"),
         (("lagrangian =", "H ="), r"unknown name `H` in \[system\]"),
     ],

@@ -25,7 +25,7 @@ def test_a_long_lattice_runs_by_its_sparse_integrators():
         sol = hz.solve(chain(30), q0, 0.0, t, **steps)
         short = hz.lattice(SITE, BOND, q0, 0.0, t, parameters=GIVEN, **steps)
         assert type(sol) is hz.SparseSolution and (sol.q == short.q).all() and (sol.z == short.z).all()
-    # With events it is a formula, which runs by collocation.
+    # With events it is a formula, which runs by the same collocation: round-off of forty steps.
     seen = hz.solve(chain(30), q0, 0.0, t, events="x[0] - 0.01", **steps)
     assert type(seen) is hz.Solution and abs(seen.q - sol.q).max() < 1e-12 and len(seen.events[0])
 
@@ -37,6 +37,7 @@ def test_a_short_lattice_is_the_formula_that_one_would_write(boundary):
     start = waves(4), [0.1, 0.0, -0.1, 0.2], 10.0
     sol = hz.solve(chain(4, boundary=boundary), *start, accuracy=1e-10)
     expected = hz.solve(written, *start, coordinates=["x[4]"], parameters=GIVEN, accuracy=1e-10)
+    # Ten times the accuracy; the derivatives are those of different steps.
     assert abs(sol.q - expected.q).max() < 1e-9
     found = sol.sensitivity(["k"]).q, expected.sensitivity(["k"]).q
     assert abs(found[0] - found[1]).max() < 1e-7
@@ -60,6 +61,7 @@ def test_masses_of_bodies_are_parameters():
     t = np.linspace(0, 2, 9)
     sol = hz.solve(pair, q0, v0, t, accuracy=1e-10)
     short = hz.bodies([1.0, 0.5], q0, v0, t, gamma=-0.1, step=0.002)
+    # Ten times the accuracy; the error of 1000 steps of order 6 is below it.
     assert abs(sol.q - short.q.reshape(9, 4)).max() < 1e-9
     # The mass of a body from the path of the other.
     found = hz.fit(pair, np.ravel(q0), np.ravel(v0), t[1:], {"x_1": sol["x_1"][1:]}, ["m_0"], t0=0.0, parameters={"m_0": 1.1})
@@ -83,14 +85,25 @@ def test_a_rigid_body_is_solved_checked_and_continued():
     same = hz.rigid_body((1, 2, 3), gamma=-0.1, omega=omega, t=t, accuracy=1e-10)
     assert (sol.omega == same.omega).all() and (sol.attitude == same.attitude).all()
     by_momentum = hz.solve(body, p0=np.array([1, 2, 3]) * omega, t=t, accuracy=1e-10)
+    # The start differs by the round-off of a linear system.
     assert abs(by_momentum.omega - sol.omega).max() < 1e-14
+    # Also with other values of the body: the inertia about the fixed point is that of these.
+    heavy = dict(mass=2.0, centre=(0.0, 0.1, 0.2))
+    by_momentum = hz.solve(body, p0=np.array([1, 2, 3]) * omega, t=t, parameters=heavy)
+    assert abs(by_momentum.Pi[0] - np.array([1, 2, 3]) * omega).max() < 1e-15
     # The plan is that of the run, and a state between rows is that of a run that ends there.
     assert (sol.plan.steps, sol.plan.integrator) == (sol.steps, sol.integrator) and "trial runs" in str(sol.plan)
     between, end = sol([0.3, 1.7]), hz.solve(body, v0=omega, t=[0, 1.7], accuracy=1e-12).end
     assert between.t.tolist() == [0.3, 1.7] and abs(between.omega[1] - end.omega[0]).max() < 1e-9
+    # A motion that ends at an event within a step has the same steps again.
+    ended = dict(v0=omega, t=[0, 4], integrator="gauss_2", step=0.3)
+    first = hz.solve(body, **ended, events=hz.Event("omega2 - 0.3", terminal=True))
+    assert 0 < first.t_end < 4 and abs(first(first.t_end).omega - first.end.omega).max() == 0
+    at = 0.9 * first.t_end
+    assert (first(at).omega == hz.solve(body, **ended)(at).omega).all()
     with pytest.raises(ValueError, match="is not in the motion"):
         sol(4.5)
-    # In two parts, of the same steps.
+    # In two parts, of the same steps: round-off of the attitude and of the velocity between them.
     first = hz.solve(body, v0=omega, t=[0, 2], integrator="gauss_4", step=0.05)
     whole = hz.solve(body, v0=omega, t=[0, 2, 4], integrator="gauss_4", step=0.05)
     assert abs(first.resume(4.0).omega[-1] - whole.omega[-1]).max() < 1e-13
@@ -98,6 +111,19 @@ def test_a_rigid_body_is_solved_checked_and_continued():
         first.resume()
     assert hz.check(body, v0=omega, t=1.0, integrator="gauss_4", step=0.05).is_contact
     assert [sol.success for sol in hz.ensemble(body, v0=[omega, omega], t=1.0)] == [True, True]
+
+
+def test_the_shortest_turn_between_attitudes():
+    from herglotz._body import _turn
+
+    def turned(axis, angle):
+        return np.array([np.cos(angle / 2), *(np.sin(angle / 2) * np.array(axis, dtype=float))])
+
+    for sign in (1.0, -1.0):
+        assert abs(_turn(turned([1, 0, 0], 0.4), sign * turned([1, 0, 0], 1.6)) - [1.2, 0, 0]).max() < 1e-15
+        # Beyond half a turn the other way is shorter.
+        assert abs(_turn(turned([0, 0, 1], 0.0), sign * turned([0, 0, 1], 4.0)) - [0, 0, 4.0 - 2 * np.pi]).max() < 1e-15
+    assert (_turn(turned([0, 1, 0], 0.3), turned([0, 1, 0], 0.3)) == 0).all()
 
 
 def test_a_path_of_a_rigid_body_joins_two_attitudes():

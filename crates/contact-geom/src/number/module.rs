@@ -22,8 +22,7 @@ pub trait TangentVector<T>: Copy + PartialEq + Debug + 'static {
     fn combined(self, a: T, other: Self, b: T) -> Self;
 }
 
-// Loops over indices: iterators are compiled once more for each type of differential, of which there are many.
-#[allow(clippy::needless_range_loop)]
+#[allow(clippy::needless_range_loop, reason = "an iterator is compiled once more for each type of differential")]
 impl<T: Scalar, const N: usize> TangentVector<T> for SVector<T, N> {
     #[inline(always)]
     fn null() -> Self {

@@ -18,8 +18,8 @@ pub fn vector_of<T: Scalar, const N: usize>(of: impl Fn(usize) -> T) -> SVector<
 
 /// The product `a . b` of two vectors, for Lagrangians, forces and Hamiltonians.
 ///
-/// It is that of nalgebra, which has code for long vectors in it that is compiled once more for each type of number, and for
-/// differentials takes a tenth of the time of all compiling.
+/// That of nalgebra has code for long vectors in addition, which is compiled once more for each type of number: with many types
+/// of differentials it was a tenth of all code.
 ///
 /// ```
 /// use contact_geom::nalgebra::SVector;

@@ -19,22 +19,16 @@ pub(super) fn entry(text: &str, system: &Location<SystemTable>) -> Result<Option
     if let (Some(_), Some(action)) = (&system.catalogue, &system.action) {
         return refuse(action.span(), "the action of a system of the catalogue is `z`; remove `action`");
     }
-    let own = system.lagrangian.as_ref().or(system.hamiltonian.as_ref()).or(system.catalogue.as_ref());
-    let of_terms = system.lattice.as_ref().map(Location::span).or(system.bodies.as_ref().map(Location::span));
-    match (of_terms, own, &system.lattice, &system.bodies) {
-        (Some(_), Some(other), ..) => {
-            return refuse(other.span(), "give this or a `lattice` or `bodies`, not both");
-        }
-        (Some(_), None, Some(_), Some(bodies)) => {
-            return refuse(bodies.span(), "give a `lattice` or `bodies`, not both");
-        }
-        (Some(_), None, ..) => {
-            if let Some(action) = &system.action {
-                return refuse(action.span(), "the action of a lattice and of bodies is `z`; remove `action`");
+    if system.lattice.is_some() || system.bodies.is_some() {
+        let own = system.lagrangian.as_ref().or(system.hamiltonian.as_ref()).or(system.catalogue.as_ref());
+        return match (own, &system.lattice, &system.bodies, &system.action) {
+            (Some(own), ..) => refuse(own.span(), "give this or a `lattice` or `bodies`, not both"),
+            (None, Some(_), Some(bodies), _) => refuse(bodies.span(), "give a `lattice` or `bodies`, not both"),
+            (None, _, _, Some(action)) => {
+                refuse(action.span(), "the action of a lattice and of bodies is `z`; remove `action`")
             }
-            return Ok(None);
-        }
-        (None, ..) => {}
+            (None, ..) => Ok(None),
+        };
     }
     match (&system.catalogue, &system.coordinates, system.lagrangian.as_ref().or(system.hamiltonian.as_ref())) {
         (Some(name), None, None) => match CatalogueEntry::find(name) {

@@ -104,12 +104,13 @@ class RigidBody(Composed):
 
     Notes
     -----
-    In the arguments of these functions `q0` is the attitude, a unit quaternion (w, x, y, z) that takes the body to space, by default the
-    identity, `v0` the angular velocity in the body, and `p0` the momentum there. They return a `RigidBodySolution` and its like.
+    In the arguments of these functions `q0` is the attitude, a unit quaternion (w, x, y, z) that takes the body to space; by
+    default it is the identity. `v0` is the angular velocity in the body, and `p0` the momentum in the body. `solve` and `path`
+    return a `RigidBodySolution`, `ensemble` a list of them, and `check` a `Check`.
     """
 
     def __init__(self, given):
-        self._given = self.parameters = given
+        self.parameters = given
 
     @property
     def system(self):
@@ -121,10 +122,10 @@ class RigidBody(Composed):
 
     def with_parameters(self, parameters):
         """The body with other values of arguments of `body`."""
-        unknown = [name for name in parameters if name not in self._given]
+        unknown = [name for name in parameters if name not in self.parameters]
         if unknown:
-            raise ValueError(f"the parameter {unknown[0]!r} is not one of a rigid body: it has {', '.join(self._given)}")
-        return RigidBody(self._given | dict(parameters))
+            raise ValueError(f"the parameter {unknown[0]!r} is not one of a rigid body: it has {', '.join(self.parameters)}")
+        return RigidBody(self.parameters | dict(parameters))
 
     def _solve(self, arguments):
         """The motion for the arguments of `solve`."""
@@ -153,7 +154,7 @@ class RigidBody(Composed):
     def _of(self, arguments, known):
         """The arguments of `rigid_body` and its like."""
         arguments = {name: x for name, x in arguments.items() if name == "t" or name != "L" and not is_absent(x)}
-        given = dict(self.with_parameters(arguments.pop("parameters", {}))._given)
+        given = dict(self.with_parameters(arguments.pop("parameters", {})).parameters)
         for name in arguments:
             if name not in known and name not in ("q0", "v0", "p0", "z0", "t"):
                 raise ValueError(f"`{name}` is not there for rigid bodies: remove it")
@@ -162,18 +163,19 @@ class RigidBody(Composed):
             raise ValueError("give either `v0`, the angular velocity in the body, or `p0`, the momentum")
         if arguments["t"] is None:
             raise ValueError("`t` is not given: give the final time, or the times of the rows")
-        given["omega"] = omega if momentum is None else self._velocity(momentum)
+        given["omega"] = omega if momentum is None else _velocity(given, momentum)
         return given | arguments | {"attitude": (1.0, 0.0, 0.0, 0.0) if attitude is None else attitude}
 
-    def _velocity(self, momentum):
-        """The angular velocity of a momentum, by the inertia about the fixed point."""
-        inertia, centre = _array("inertia", self._given["inertia"]), _array("centre", self._given["centre"])
-        inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
-        inertia = inertia + self._given["mass"] * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        return np.linalg.solve(inertia, _array("p0", momentum).T).T
-
     def __repr__(self):
-        return f"<RigidBody: inertia {np.asarray(self._given['inertia']).tolist()}>"
+        return f"<RigidBody: inertia {np.asarray(self.parameters['inertia']).tolist()}>"
+
+
+def _velocity(given, momentum):
+    """The angular velocity of a momentum, by the inertia about the fixed point."""
+    inertia, centre = _array("inertia", given["inertia"]), _array("centre", given["centre"])
+    inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
+    inertia = inertia + given["mass"] * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    return np.linalg.solve(inertia, _array("p0", momentum).T).T
 
 
 def _turn(start, to):
@@ -267,17 +269,19 @@ class RigidBodySolution(RigidBodyStates):
         -------
         RigidBodyStates
         """
-        body, start, asked, _, _, _, _ = self._request
+        body, start, asked, _, _, events, _ = self._request
         times = np.array(t, dtype=float, ndmin=1)
         asked = np.atleast_1d(np.asarray(asked, dtype=float))
         first, last = asked[0] if len(asked) > 1 else 0.0, self.t_end
         outside = [x for x in times.ravel() if not min(first, last) <= x <= max(first, last)]
         if outside:
             raise ValueError(f"t = {outside[0]} is not in the motion, which is from {first} to {last}")
-        order = np.unique(np.concatenate([times.ravel(), [first, last]]))
-        order = order if last >= first else order[::-1]
-        found = _core.run_rigid_body(body, start, order, None, self._way(), [], False, None)
-        at = {x: row for x, row in zip(order, found.rows)}
+        # The steps are those of the whole span: a run that a terminal event has ended meets it again.
+        end = asked[-1] if self.success else last
+        order = np.unique(np.concatenate([times.ravel(), [first, end]]))
+        order = order if end >= first else order[::-1]
+        found = _core.run_rigid_body(body, start, order, None, self._way(), events, False, None)
+        at = {row[0]: row for row in found.rows} | {last: found.end}
         return RigidBodyStates(np.array([at[x] for x in times.ravel()]))
 
     def resume(self, t=None, *, progress=False, callback=None, callback_interval=1.0):

@@ -23,6 +23,8 @@ _KEYS = {
     "lattice": "sites boundary coordinates site bond parameters",
     "body": "inertia mass centre gravity gamma torque",
 }
+_OF_ROWS = "every at every_step columns"
+_OF_EVENT = "when direction terminal from columns then impact rest"
 _TABLES = {*_KEYS, "version", "start", "ends", "force", "friction", "tables", "sweep", "fit"}
 
 
@@ -86,10 +88,13 @@ def _check(data):
     for name in data:
         if name not in _TABLES:
             raise ValueError(f"unknown table `{name}`; a scene has {', '.join(sorted(_TABLES))}")
-    for name, keys in _KEYS.items():
-        for key in data.get(name, {}):
+    want = data.get("want", {})
+    parts = [(f"[{name}]", keys, data.get(name, {})) for name, keys in _KEYS.items()]
+    parts += [("`rows`", _OF_ROWS, want.get("rows", {})), *(("an event", _OF_EVENT, event) for event in want.get("events", []))]
+    for name, keys, found in parts:
+        for key in found:
             if key not in keys.split():
-                raise ValueError(f"unknown name `{key}` in [{name}], which has {', '.join(keys.split())}")
+                raise ValueError(f"unknown name `{key}` in {name}, which has {', '.join(keys.split())}")
     if not {"system", "lattice", "body"} & set(data):
         raise ValueError("the scene has no [system]")
     for name in ("start", "run"):

@@ -39,7 +39,8 @@ class SparseSystem(Composed):
     """
 
     def __init__(self, what, shape, made, parameters):
-        # The sparse integrators are reached by `what`, a formula by `made` with parameters.
+        # `made` has the function of the core that runs it, the one that writes its formula, and what both take before the
+        # parameters.
         self._what, self.shape, self._made, self.parameters = what, tuple(shape), made, dict(parameters)
         self.dimension = int(np.prod(self.shape))
 
@@ -75,8 +76,6 @@ class SparseSystem(Composed):
         others = {name for name, x in arguments.items() if name not in _OF_RUN and not is_absent(x)}
         if self.dimension > _FEW and not others and isinstance(asked["integrator"], str) and (asked["step"], asked["steps"]) != (None, None):
             watch = Watch(*(asked.pop(name) for name in ("progress", "callback", "callback_interval")))
-            if "gamma" in of.parameters:
-                warn_of_positive(of.parameters["gamma"])
             return of._solution(**asked, watch=watch)
         return solve(**arguments | {"L": of.system})
 
@@ -86,7 +85,13 @@ class SparseSystem(Composed):
         if q0.size != self.dimension:
             raise ValueError(f"`q0` has {q0.size} numbers, but the {self._what} has {self.dimension} coordinates")
         run = functools.partial(self._made[0], *self._made[2:], self.parameters)
-        return _solution(run, request, q0.shape, len(q0.shape) > 1 and self._what == "system of bodies", watch)
+        found = _solution(run, request, q0.shape, len(q0.shape) > 1 and self._what == "system of bodies", watch)
+        if self._what != "lattice":
+            warn_of_positive(self.parameters["gamma"])
+        elif "gamma" in self.parameters:
+            coordinates, site, _ = self._made[2]
+            warn_of_gain(_core.System(site, coordinates, self.parameters), np.zeros(len(coordinates)))
+        return found
 
     def __repr__(self):
         return f"<SparseSystem: a {self._what} of shape {self.shape}>"
@@ -365,10 +370,7 @@ def lattice(
         _no_motion(v0=v0, t=t, p0=p0, step=step, steps=steps, every=every)
         return system
     watch = Watch(progress, callback, callback_interval)
-    found = system._solution(q0, v0, t, p0, z0, integrator, step, steps, every, conformal_factor, watch)
-    if parameters and "gamma" in parameters:
-        warn_of_gain(_core.System(site, coordinates, parameters), np.zeros(len(coordinates)))
-    return found
+    return system._solution(q0, v0, t, p0, z0, integrator, step, steps, every, conformal_factor, watch)
 
 
 def bodies(
@@ -451,7 +453,6 @@ def bodies(
         _no_motion(v0=v0, t=t, p0=p0, step=step, steps=steps, every=every)
         return system
     watch = Watch(progress, callback, callback_interval)
-    warn_of_positive(gamma)
     return system._solution(q0, v0, t, p0, z0, integrator, step, steps, every, conformal_factor, watch)
 
 

@@ -17,7 +17,7 @@ _MOST = 256
 
 
 class Composed:
-    """What stands for a Lagrangian: `solve` leaves its motion to it, and elsewhere it is its `system`."""
+    """An object in place of a Lagrangian: `solve` calls its `_solve`, and other functions use its formula, `system`."""
 
     def _with(self, parameters):
         """The same with those of the parameters that it has, and the others, which events, columns and forces may have."""
