@@ -15,7 +15,8 @@ use formula_lagrangian::{Formula, FormulaLagrangian};
 /// more than the unused coordinates cost a search.
 pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<FoundPath, RuntimeError> {
     match formula.dimension() {
-        1..=2 => within::<2>(formula, problem),
+        1 => within::<1>(formula, problem),
+        2 => within::<2>(formula, problem),
         3..=4 => within::<4>(formula, problem),
         5..=8 => within::<8>(formula, problem),
         n => Err(RuntimeError::argument(
