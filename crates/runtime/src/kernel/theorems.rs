@@ -36,7 +36,7 @@ pub(super) fn theorems(
             }
         };
     }
-    of!(2 4 16)
+    of!(1 2 4 16)
 }
 
 /// The theorems for a discrete Lagrangian of one's own: the largest residuals over some points. Its symmetries are not known.
