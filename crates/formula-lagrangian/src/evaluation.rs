@@ -44,7 +44,7 @@ impl Tape {
     #[inline(always)]
     pub fn evaluate<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
         // Nested dual numbers are not evaluated in long computations, so that their registers may be on the heap.
-        if T::NESTED || self.registers > REGISTERS_LARGE {
+        if T::ORDER > 0 || self.registers > REGISTERS_LARGE {
             self.interpret::<T, N>(at, &mut vec![T::zero(); self.registers], results);
         } else if self.registers <= REGISTERS_TINY {
             self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_TINY]).0, results);

@@ -30,14 +30,34 @@ pub struct Dual<T, D> {
 /// A [`Dual`] for SIMD kernels: all of its operations are inlined into the code that calls them.
 ///
 /// The instruction set of a kernel is selected at run time, and functions that are not inlined into the kernel are
-/// compiled without it, at twenty times the cost. For nested duals, and for long programs on them, the inlined code
-/// would be too long to compile; they use [`Dual`].
+/// compiled without it, at twenty times the cost. Operations of third order are functions of their own, compiled with these
+/// instructions: inlined they would be too long. Long programs on nested duals use [`Dual`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KernelDual<T, D> {
     /// The value.
     pub re: T,
     /// The differential: the derivative along each direction.
     pub d: D,
+}
+
+/// The order of the derivatives in T from which an operation on duals over T is a function of its own. It is some hundred
+/// products there: a call costs little, and the code of a Lagrangian with all of them inlined takes the compiler minutes.
+const MIN_ORDER_APART: u32 = 2;
+
+/// Performs an operation on duals over T, in a function of its own where it is long.
+#[inline(always)]
+fn apart_if_long<T: Scalar, R>(work: impl FnOnce() -> R) -> R {
+    if const { T::ORDER >= MIN_ORDER_APART } { T::apart(work) } else { work() }
+}
+
+/// An operation on duals over a type, in a function of its own where it is long.
+macro_rules! apart {
+    ($T:ident, $work:expr) => {
+        apart_if_long::<$T, _>(
+            #[inline(always)]
+            || $work,
+        )
+    };
 }
 
 /// The arithmetic, with the given inline attribute on its functions.
@@ -91,7 +111,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn neg(self) -> Self {
-                $Dual { re: -self.re, d: self.d.each(|a| -a) }
+                apart!(T, $Dual { re: -self.re, d: self.d.each(|a| -a) })
             }
         }
 
@@ -99,7 +119,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn add(self, b: Self) -> Self {
-                $Dual { re: self.re + b.re, d: self.d.join(b.d, |x, y| x + y) }
+                apart!(T, $Dual { re: self.re + b.re, d: self.d.join(b.d, |x, y| x + y) })
             }
         }
 
@@ -107,7 +127,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn sub(self, b: Self) -> Self {
-                $Dual { re: self.re - b.re, d: self.d.join(b.d, |x, y| x - y) }
+                apart!(T, $Dual { re: self.re - b.re, d: self.d.join(b.d, |x, y| x - y) })
             }
         }
 
@@ -115,8 +135,10 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn mul(self, b: Self) -> Self {
-                let a = self.re;
-                $Dual { re: a * b.re, d: self.d.combined(b.re, b.d, a) }
+                apart!(T, {
+                    let a = self.re;
+                    $Dual { re: a * b.re, d: self.d.combined(b.re, b.d, a) }
+                })
             }
         }
 
@@ -124,8 +146,10 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn div(self, b: Self) -> Self {
-                let (quotient, inverse) = (self.re / b.re, b.re.recip());
-                $Dual { re: quotient, d: self.d.join(b.d, |x, y| (x - quotient * y) * inverse) }
+                apart!(T, {
+                    let (quotient, inverse) = (self.re / b.re, b.re.recip());
+                    $Dual { re: quotient, d: self.d.join(b.d, |x, y| (x - quotient * y) * inverse) }
+                })
             }
         }
 
@@ -133,7 +157,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn add(self, b: f64) -> Self {
-                $Dual { re: self.re + b, d: self.d }
+                apart!(T, $Dual { re: self.re + b, d: self.d })
             }
         }
 
@@ -141,7 +165,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn sub(self, b: f64) -> Self {
-                $Dual { re: self.re - b, d: self.d }
+                apart!(T, $Dual { re: self.re - b, d: self.d })
             }
         }
 
@@ -149,7 +173,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn mul(self, b: f64) -> Self {
-                $Dual { re: self.re * b, d: self.d.each(|a| a * b) }
+                apart!(T, $Dual { re: self.re * b, d: self.d.each(|a| a * b) })
             }
         }
 
@@ -157,7 +181,7 @@ macro_rules! arithmetic {
             type Output = Self;
             #[$inline]
             fn div(self, b: f64) -> Self {
-                $Dual { re: self.re / b, d: self.d.each(|a| a / b) }
+                apart!(T, $Dual { re: self.re / b, d: self.d.each(|a| a / b) })
             }
         }
 
@@ -190,7 +214,7 @@ macro_rules! arithmetic {
         }
 
         impl<T: Scalar, D: TangentVector<T>> Scalar for $Dual<T, D> {
-            const NESTED: bool = true;
+            const ORDER: u32 = T::ORDER + 1;
 
             #[$inline]
             fn re(self) -> f64 {
@@ -211,107 +235,134 @@ macro_rules! arithmetic {
             }
             #[$inline]
             fn if_less(self, than: Self, then: Self, otherwise: Self) -> Self {
-                let (a, b) = (self.re, than.re);
-                $Dual {
-                    re: a.if_less(b, then.re, otherwise.re),
-                    d: then.d.join(otherwise.d, |x, y| a.if_less(b, x, y)),
-                }
+                apart!(T, {
+                    let (a, b) = (self.re, than.re);
+                    $Dual {
+                        re: a.if_less(b, then.re, otherwise.re),
+                        d: then.d.join(otherwise.d, |x, y| a.if_less(b, x, y)),
+                    }
+                })
             }
             #[$inline]
             fn abs(self) -> Self {
-                self.chain(self.re.abs(), self.re.signum())
+                apart!(T, self.chain(self.re.abs(), self.re.signum()))
             }
             #[$inline]
             fn recip(self) -> Self {
-                let r = self.re.recip();
-                self.chain(r, -(r * r))
+                apart!(T, {
+                    let r = self.re.recip();
+                    self.chain(r, -(r * r))
+                })
             }
             #[$inline]
             fn sqrt(self) -> Self {
-                let r = self.re.sqrt();
-                self.chain_from_root(r, r.slope_power(-1.0) * 0.5)
+                apart!(T, {
+                    let r = self.re.sqrt();
+                    self.chain_from_root(r, r.slope_power(-1.0) * 0.5)
+                })
             }
             #[$inline]
             fn powi(self, n: i32) -> Self {
-                if n == 0 {
-                    return Self::one();
-                }
-                let below = self.re.powi(n.saturating_sub(1));
-                self.chain(below * self.re, below * f64::from(n))
+                apart!(T, {
+                    if n == 0 {
+                        return Self::one();
+                    }
+                    let below = self.re.powi(n.saturating_sub(1));
+                    self.chain(below * self.re, below * f64::from(n))
+                })
             }
             #[$inline]
             fn powf(self, a: f64) -> Self {
-                // The value is computed separately: the power in the slope is infinite at 0, and overflows or
-                // underflows before the value does.
-                match a {
-                    0.0 => Self::one(),
-                    1.0 => self,
-                    // The value itself is infinite at 0, and a differential of 0 gives NaN there.
-                    _ if a < 0.0 => self.chain(self.re.powf(a), self.re.powf(a - 1.0) * a),
-                    _ => self.chain_from_root(self.re.powf(a), self.re.slope_power(a - 1.0) * a),
-                }
+                apart!(T, {
+                    // The value is computed separately: the power in the slope is infinite at 0, and overflows or
+                    // underflows before the value does.
+                    match a {
+                        0.0 => Self::one(),
+                        1.0 => self,
+                        // The value itself is infinite at 0, and a differential of 0 gives NaN there.
+                        _ if a < 0.0 => self.chain(self.re.powf(a), self.re.powf(a - 1.0) * a),
+                        _ => self.chain_from_root(self.re.powf(a), self.re.slope_power(a - 1.0) * a),
+                    }
+                })
             }
             #[$inline]
             fn along_slope(self, slope: Self) -> Self {
-                let (x, s) = (self.re, slope.re);
-                $Dual { re: x.along_slope(s), d: self.d.join(slope.d, |dx, ds| dx.along_slope(s) + x.along_slope(ds)) }
+                apart!(T, {
+                    let (x, s) = (self.re, slope.re);
+                    $Dual {
+                        re: x.along_slope(s),
+                        d: self.d.join(slope.d, |dx, ds| dx.along_slope(s) + x.along_slope(ds)),
+                    }
+                })
             }
             #[$inline]
             fn slope_power(self, a: f64) -> Self {
-                match a {
-                    0.0 => Self::one(),
-                    1.0 => self,
-                    -1.0 => {
-                        let r = self.re.slope_power(a);
-                        self.chain_from_root(r, -(r * r))
+                apart!(T, {
+                    match a {
+                        0.0 => Self::one(),
+                        1.0 => self,
+                        -1.0 => {
+                            let r = self.re.slope_power(a);
+                            self.chain_from_root(r, -(r * r))
+                        }
+                        _ => self.chain_from_root(self.re.slope_power(a), self.re.slope_power(a - 1.0) * a),
                     }
-                    _ => self.chain_from_root(self.re.slope_power(a), self.re.slope_power(a - 1.0) * a),
-                }
+                })
             }
             #[$inline]
             fn exp(self) -> Self {
-                let e = self.re.exp();
-                self.chain(e, e)
+                apart!(T, {
+                    let e = self.re.exp();
+                    self.chain(e, e)
+                })
             }
             #[$inline]
             fn exp_m1(self) -> Self {
-                let e = self.re.exp_m1();
-                self.chain(e, e + 1.0)
+                apart!(T, {
+                    let e = self.re.exp_m1();
+                    self.chain(e, e + 1.0)
+                })
             }
             #[$inline]
             fn ln(self) -> Self {
-                self.chain(self.re.ln(), self.re.recip())
+                apart!(T, self.chain(self.re.ln(), self.re.recip()))
             }
             #[$inline]
             fn ln_1p(self) -> Self {
-                self.chain(self.re.ln_1p(), (self.re + 1.0).recip())
+                apart!(T, self.chain(self.re.ln_1p(), (self.re + 1.0).recip()))
             }
             #[$inline]
             fn sin_cos(self) -> (Self, Self) {
-                let (s, c) = self.re.sin_cos();
-                (self.chain(s, c), self.chain(c, -s))
+                apart!(T, {
+                    let (s, c) = self.re.sin_cos();
+                    (self.chain(s, c), self.chain(c, -s))
+                })
             }
             #[$inline]
             fn sin_versine(self) -> (Self, Self) {
-                let (s, v) = self.re.sin_versine();
-                (self.chain(s, -v + 1.0), self.chain(v, s))
+                apart!(T, {
+                    let (s, v) = self.re.sin_versine();
+                    (self.chain(s, -v + 1.0), self.chain(v, s))
+                })
             }
             #[$inline]
             fn sinh(self) -> Self {
-                self.chain(self.re.sinh(), self.re.cosh())
+                apart!(T, self.chain(self.re.sinh(), self.re.cosh()))
             }
             #[$inline]
             fn cosh(self) -> Self {
-                self.chain(self.re.cosh(), self.re.sinh())
+                apart!(T, self.chain(self.re.cosh(), self.re.sinh()))
             }
             #[$inline]
             fn tanh(self) -> Self {
-                let t = self.re.tanh();
-                self.chain(t, -(t * t) + 1.0)
+                apart!(T, {
+                    let t = self.re.tanh();
+                    self.chain(t, -(t * t) + 1.0)
+                })
             }
             #[$inline]
             fn atan(self) -> Self {
-                self.chain(self.re.atan(), (self.re * self.re + 1.0).recip())
+                apart!(T, self.chain(self.re.atan(), (self.re * self.re + 1.0).recip()))
             }
             #[$inline]
             fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {

@@ -150,9 +150,8 @@ pub trait Scalar:
     fn piecewise<const K: usize>(self, of: impl Fn(f64) -> [f64; K] + Copy) -> [Self; K] {
         of(self.re()).map(Self::from)
     }
-    /// Whether the type is a number with derivatives, which is so large that many of them are better kept on the heap
-    /// than on the stack.
-    const NESTED: bool = false;
+    /// The order of the derivatives that the number carries: the number of duals that are nested in its type.
+    const ORDER: u32 = 0;
 
     /// Runs a computation over these numbers in a function of its own, compiled with the instruction set that they
     /// need, for programs that are too long to be inlined into each calling kernel, such as interpreters. The functions
