@@ -40,31 +40,52 @@ impl Graph {
     /// ```
     pub fn composed(&mut self, of: &Formula, at: Inputs<'_>) -> Option<Id> {
         let needed = of.graph.needed(of.root);
-        let mut images: Vec<Option<Id>> = Vec::with_capacity(needed.len());
+        let mut images: Vec<Id> = Vec::with_capacity(needed.len());
         for (i, needed) in needed.into_iter().enumerate() {
-            let image = |id: Id| images.get(id.index()).copied().flatten();
-            let found = match of.graph.node(Id(i as u32)) {
-                _ if !needed => None,
-                Node::Number(bits) => Some(self.number(f64::from_bits(bits))),
-                Node::Parameter(k) => Some(*at.parameters.get(k as usize)?),
-                Node::Position(k) => Some(*at.q.get(k as usize)?),
-                Node::Velocity(k) => Some(*at.v.get(k as usize)?),
-                Node::Action => Some(at.z),
-                Node::Time => Some(at.t),
-                Node::Unary(function, a) => Some(self.unary(function, image(a)?)),
-                Node::Binary(operation, a, b) => {
-                    let (a, b) = (image(a)?, image(b)?);
-                    Some(self.binary(operation, a, b))
-                }
-                Node::Powi(a, n) => Some(self.powi(image(a)?, n)),
-                Node::Select([a, b, then, otherwise]) => {
-                    let all = [image(a)?, image(b)?, image(then)?, image(otherwise)?];
-                    Some(self.select(all))
-                }
+            let image = match of.graph.node(Id(i as u32)) {
+                // Nothing that is needed contains it.
+                _ if !needed => at.t,
+                Node::Number(bits) => self.number(f64::from_bits(bits)),
+                Node::Parameter(k) => *at.parameters.get(k as usize)?,
+                Node::Position(k) => *at.q.get(k as usize)?,
+                Node::Velocity(k) => *at.v.get(k as usize)?,
+                Node::Action => at.z,
+                Node::Time => at.t,
                 Node::Table { .. } => return None,
+                node => self.with_operands(node, |a| images.get(a.index()).copied().unwrap_or(a)),
             };
-            images.push(found);
+            images.push(image);
         }
-        images.get(of.root.index()).copied().flatten()
+        images.last().copied()
+    }
+
+    /// A node with others in the places of some of the nodes that it contains, simplified.
+    pub(crate) fn replaced(&mut self, of: Id, by: impl Fn(Node) -> Option<Id>) -> Id {
+        let needed = self.needed(of);
+        let mut images: Vec<Id> = Vec::with_capacity(needed.len());
+        for (i, needed) in needed.into_iter().enumerate() {
+            let id = Id(i as u32);
+            let image = match self.node(id) {
+                _ if !needed => id,
+                node => match by(node) {
+                    Some(other) => other,
+                    None => self.with_operands(node, |a| images.get(a.index()).copied().unwrap_or(a)),
+                },
+            };
+            images.push(image);
+        }
+        images.last().copied().unwrap_or(of)
+    }
+
+    /// A node with other operands, simplified.
+    fn with_operands(&mut self, node: Node, image: impl Fn(Id) -> Id) -> Id {
+        match node {
+            Node::Unary(function, a) => self.unary(function, image(a)),
+            Node::Binary(operation, a, b) => self.binary(operation, image(a), image(b)),
+            Node::Powi(a, n) => self.powi(image(a), n),
+            Node::Select(all) => self.select(all.map(image)),
+            Node::Table { table, order, argument } => self.lookup(table, order, image(argument)),
+            input => self.intern(input),
+        }
     }
 }

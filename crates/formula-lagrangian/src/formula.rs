@@ -1,7 +1,7 @@
 //! Formulas: an expression graph with the names of its coordinates and parameters.
 
 use crate::forces::Forces;
-use crate::friction::Mode;
+use crate::modes::Mode;
 use crate::names::Names;
 use crate::node::Inputs;
 use crate::resets::FormulaReset;
@@ -35,7 +35,7 @@ pub struct Formula {
     pub(crate) constraints: Vec<Id>,
     /// Their texts, empty for those that were given as nodes.
     pub(crate) constraint_texts: Vec<String>,
-    /// The modes of coordinates with friction, which are the last coordinates.
+    /// The modes of coordinates with friction or with a resting contact, which are the last coordinates.
     pub(crate) modes: Vec<Mode>,
 }
 

@@ -101,32 +101,7 @@ impl Graph {
 
     /// The node with all velocities set to 0, simplified.
     pub(crate) fn at_rest(&mut self, of: Id) -> Id {
-        let needed = self.needed(of);
-        let mut images: Vec<Id> = Vec::with_capacity(needed.len());
-        for (i, needed) in needed.into_iter().enumerate() {
-            let id = Id(i as u32);
-            let image = |a: Id| images.get(a.index()).copied().unwrap_or(a);
-            let at_rest = match self.node(id) {
-                _ if !needed => id,
-                Node::Velocity(_) => self.number(0.0),
-                Node::Unary(f, a) => {
-                    let a = image(a);
-                    self.unary(f, a)
-                }
-                Node::Binary(o, a, b) => {
-                    let (a, b) = (image(a), image(b));
-                    self.binary(o, a, b)
-                }
-                Node::Powi(a, n) => {
-                    let a = image(a);
-                    self.powi(a, n)
-                }
-                Node::Select(all) => self.select(all.map(image)),
-                Node::Table { table, order, argument } => self.lookup(table, order, image(argument)),
-                _ => id,
-            };
-            images.push(at_rest);
-        }
-        images.last().copied().unwrap_or(of)
+        let zero = self.number(0.0);
+        self.replaced(of, |node| matches!(node, Node::Velocity(_)).then_some(zero))
     }
 }

@@ -167,7 +167,7 @@ impl Members {
         values: &[Bound<'_, PyAny>],
         threads: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let n = system.inner.dimension();
+        let n = system.formula.given_dimension();
         let (count, q) = table("q0", &q, n)?;
         let argument = if is_momentum { "p0" } else { "v0" };
         let (velocity_count, velocity) = table(argument, &velocity, n)?;
@@ -240,18 +240,19 @@ pub fn run_ensemble(
     threads: Option<Bound<'_, PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<EnsembleRecord> {
-    let (n, times) = (system.inner.dimension(), motion::times(&t)?);
+    let times = motion::times(&t)?;
     let members = Members::new(system, start, &times, &step_control, names, &values, threads)?;
     let count = members.count;
     let rows = (times.len() > 2).then(|| times.clone());
+    let (with_resets, events) = crate::events::events(events, system)?;
+    let n = with_resets.dimension();
     let mut columns: Vec<Column> = (0..n).map(Column::Position).collect();
     columns.extend((0..n).map(Column::Velocity));
     columns.extend((0..n).map(Column::Momentum));
     columns.push(Column::Action);
     for text in &observed {
-        columns.push(named("the column", text, Column::parse(text, &system.formula))?);
+        columns.push(named("the column", text, Column::parse(text, with_resets.formula()))?);
     }
-    let (with_resets, events) = crate::events::events(events, system)?;
     let done = Arc::new(AtomicUsize::new(0));
     let mut kept = RowStore {
         n,

@@ -16,7 +16,7 @@ type GivenChange<'py> = (Option<Assignments>, Option<(String, Option<Bound<'py, 
 /// The text of an event, its direction, whether it ends the motion, and how the state changes there.
 pub type GivenEvent<'py> = (String, Bound<'py, PyAny>, bool, Option<GivenChange<'py>>);
 
-/// The requested events, and the system with their resets.
+/// The requested events, and the system with their resets, on whose surfaces coordinates stay that come to rest there.
 pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz_runtime::System, Vec<Event>)> {
     let mut formula = of.formula.clone();
     let mut events = Vec::with_capacity(given.len());
@@ -28,14 +28,25 @@ pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz_run
             event.reset = Some(formula.resets());
             formula = with_change(&formula, &text, direction, change)?;
         }
-        events.push(event);
+        events.push((text, event));
     }
-    let system = if formula.resets() > 0 {
-        herglotz_runtime::System::new(&formula).map_err(value_error)?
-    } else {
-        of.inner.clone()
-    };
-    Ok((system, events))
+    if formula.resets() == of.formula.resets() {
+        return Ok((of.inner.clone(), events.into_iter().map(|(_, event)| event).collect()));
+    }
+    let formula = formula.with_resting_contact().map_err(value_error)?;
+    // In the coordinates with those of the contacts.
+    let events = events.into_iter().map(|(text, event)| {
+        let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
+        Ok(Event { function, ..event })
+    });
+    let events = events.collect::<PyResult<_>>()?;
+    Ok((herglotz_runtime::System::new(&formula).map_err(value_error)?, events))
+}
+
+/// The names of the coordinates of a system with the resets of events, with those of the modes of resting contact.
+#[pyfunction]
+pub fn coordinates_of(system: &System, given: Vec<GivenEvent<'_>>) -> PyResult<Vec<String>> {
+    Ok(events(given, system)?.0.formula().coordinates())
 }
 
 /// The formula with the reset or the impact of an event.

@@ -48,6 +48,8 @@ mod _core {
     #[pymodule_export]
     use crate::ensemble::{EnsembleRecord, run_ensemble};
     #[pymodule_export]
+    use crate::events::coordinates_of;
+    #[pymodule_export]
     use crate::exact::{exact_lagrangian, exponential, retract};
     #[pymodule_export]
     use crate::fit::{FitRecord, fit_motion};

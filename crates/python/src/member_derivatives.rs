@@ -79,8 +79,12 @@ type Gradients = (
     Troubles,
 );
 
-fn gradients(py: Python<'_>, system: &System, found: Vec<Result<LossGradient, RuntimeError>>) -> PyResult<Gradients> {
-    let (n, m) = (system.inner.dimension(), system.formula.parameters().count());
+fn gradients(
+    py: Python<'_>,
+    system: &herglotz_runtime::System,
+    found: Vec<Result<LossGradient, RuntimeError>>,
+) -> PyResult<Gradients> {
+    let (n, m) = (system.dimension(), system.formula().parameters().count());
     let (mut values, mut z, mut times) = (Vec::new(), Vec::new(), [const { Vec::new() }; 3]);
     let (mut q, mut velocity, mut parameters, mut troubles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (index, member) in found.into_iter().enumerate() {
@@ -125,7 +129,7 @@ pub fn ensemble_pullback(
     z: Bound<'_, PyAny>,
 ) -> PyResult<Gradients> {
     let request = Request::new(system, given)?;
-    let (n, k) = (system.inner.dimension(), request.times.len());
+    let (n, k) = (request.system.dimension(), request.times.len());
     let [q, v, p] = &parts;
     let (q, v, p, z) = (numbers("q", q)?, numbers("v", v)?, numbers("p", p)?, numbers("z", &z)?);
     let loss = |index: usize, states: &[MotionState]| {
@@ -145,7 +149,7 @@ pub fn ensemble_pullback(
     let found = interruptible(py, |interrupt| {
         request.with(|system, ensemble| system.ensemble_gradient(ensemble, &request.times, &loss, Some(interrupt)))
     })?;
-    gradients(py, system, found)
+    gradients(py, &request.system, found)
 }
 
 /// The values and the gradients of an expression of the final state of each member.
@@ -157,11 +161,11 @@ pub fn ensemble_value_and_gradient(
     loss: &str,
 ) -> PyResult<Gradients> {
     let request = Request::new(system, given)?;
-    let expression = loss_of(&system.inner, loss)?;
+    let expression = loss_of(&request.system, loss)?;
     let found = interruptible(py, |interrupt| {
         request.with(|system, ensemble| system.ensemble_end_gradient(ensemble, &expression, Some(interrupt)))
     })?;
-    gradients(py, system, found)
+    gradients(py, &request.system, found)
 }
 
 /// The derivatives of q, v and p in the rows of all members with respect to variables: for each member, a row for each
@@ -181,7 +185,7 @@ pub fn ensemble_sensitivity(
     let found = interruptible(py, |interrupt| {
         request.with(|system, ensemble| system.ensemble_sensitivity(ensemble, &names, &request.times, Some(interrupt)))
     })?;
-    let (n, rows) = (system.inner.dimension(), request.times.len() * names.len());
+    let (n, rows) = (request.system.dimension(), request.times.len() * names.len());
     let (mut parts, mut z) = ([const { Vec::new() }; 3], Vec::new());
     let (mut growths, mut troubles) = (Vec::new(), Vec::new());
     for (index, member) in found.into_iter().enumerate() {

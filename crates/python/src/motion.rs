@@ -113,7 +113,8 @@ impl Motion {
         project: bool,
         exact: bool,
     ) -> PyResult<Self> {
-        let formula = &system.formula;
+        let (with_resets, events) = crate::events::events(events, system)?;
+        let formula = with_resets.formula();
         let (q, velocity, is_momentum, z, near) = start;
         let q = numbers("q0", &q)?;
         let velocity = if is_momentum {
@@ -157,7 +158,6 @@ impl Motion {
         for text in &columns {
             all.push(named("the column", text, Column::parse(text, formula))?);
         }
-        let (with_resets, events) = crate::events::events(events, system)?;
         let start = Start { t: first, q, velocity, z: number("z0", &z)? };
         let scales = scales.map(|scales| numbers("scales", &scales)).transpose()?;
         let signals = Signals::new();

@@ -16,6 +16,7 @@ mod own_methods;
 mod pairs;
 mod path;
 mod rest;
+mod resting_contact;
 mod rows_beside_kinks;
 mod sensitive;
 mod sensitivity;

@@ -352,7 +352,8 @@ pub enum StepError {
     /// Resets accumulate.
     #[error(
         "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or say \
-         from which state, that is not pressed onto the surface, the motion continues"
+         from which state the motion continues: a formula stays on the surface where `rest` assigns the velocity of the \
+         surface to its one coordinate"
     )]
     Accumulation {
         /// The limit of their times.
@@ -360,9 +361,10 @@ pub enum StepError {
     },
     /// The motion rests on the surface of a reset, and is pressed onto it.
     #[error(
-        "the motion rests at t = {t} on the surface of a reset, and is pressed onto it: contact that lasts is not \
-         computed; end the run before it, let the reset assign a state that leaves the surface or a coordinate that \
-         switches the force off, or replace the surface by a stiff force"
+        "the motion rests at t = {t} on the surface of a reset, and is pressed onto it; a formula stays \
+         there where `rest` of the reset assigns the velocity of the surface to its one coordinate; otherwise end the run \
+         before, let the reset assign a state that leaves the surface or a coordinate that switches the force off, or \
+         replace the surface by a stiff force"
     )]
     Contact {
         /// The time at which the contact begins.

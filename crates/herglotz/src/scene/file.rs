@@ -244,7 +244,8 @@ pub(crate) struct EventTable {
     /// normal velocity by -0.8, and `{ conformal = 0.64 }` multiplies the contact form by 0.64.
     pub impact: Option<Location<ImpactLaw>>,
     /// With `then` or `impact`: where resets accumulate, the variables that get new values, from which the motion
-    /// continues, as in `{ "x'" = "0" }`. By default the run ends there.
+    /// continues, as in `{ "x'" = "0" }`. By default the run ends there. With the velocity of the surface of one coordinate x the
+    /// motion stays on it until the force pulls it off, and has one coordinate more: `contact_x`, 0 in flight, 1 in contact.
     pub rest: Option<Location<Named<String>>>,
 }
 

@@ -381,8 +381,8 @@ impl Scene {
         let StepError::Accumulation { t } = cause else { return None };
         Some(format!(
             "resets accumulate at t = {t}: infinitely many of them occur before this time; end the run before it, or \
-             let `rest` of the event assign the state from which the motion continues: one that leaves the surface, or \
-             a coordinate that switches the force off, as in scenes/stick_slip.toml"
+             let `rest` of the event assign the state from which the motion continues: the velocity of the surface, where \
+             the motion then stays as in scenes/bouncing.toml, or a state that leaves it"
         ))
     }
 }

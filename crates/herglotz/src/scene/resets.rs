@@ -9,7 +9,7 @@ use crate::runtime::{Formula, FormulaDirection, FormulaError, FormulaReset, Impa
 /// The number of the reset of each event in the formula; `None` for an event without one.
 pub(super) type ResetNumbers = Vec<Option<usize>>;
 
-/// The formula with the resets and impacts of the events.
+/// The formula with the resets and impacts of the events, on whose surfaces coordinates stay that come to rest there.
 pub(super) fn with_resets(
     text: &str,
     mut formula: Formula,
@@ -29,7 +29,9 @@ pub(super) fn with_resets(
         }
         numbers.push(Some(number));
     }
-    Ok((formula, numbers))
+    let Some(event) = events.iter().find(|event| event.rest.is_some()) else { return Ok((formula, numbers)) };
+    let refused = |error: FormulaError| SceneError::at(text, event.when.span(), error.to_string());
+    Ok((formula.with_resting_contact().map_err(refused)?, numbers))
 }
 
 /// Rejects entries of an event that exclude each other.

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import _core
 from ._additions import breaks_of
-from ._events import events_of, has_reset, texts_of_events
+from ._events import coordinates_with, events_of, has_reset, texts_of_events
 from ._rows import axes_of
 from ._solution import Interrupted, crossings
 from ._solve import columns_of, functions_of, system_and_start
@@ -214,11 +214,11 @@ class Ensemble:
     """
 
     def __init__(self, system, record, event_names, observed, request):
-        self.system, self._request = system, request
+        self.system, self._request, self._coordinates = system, request, coordinates_with(system, request[6])
         events = request[6]
         self.t, self.steps, self.success, self.times = record.t, record.steps, record.success, record.times
         self.troubles, self.batch_kernel, self.own_plans = dict(record.troubles), record.batch_kernel, record.own_plans
-        count, n = len(record.t), system.dimension
+        count, n = len(record.t), len(self._coordinates)
         many = () if self.times is None else (len(self.times),)
         self.q, self.v, self.p = (x.reshape(count, *many, n) for x in (record.q, record.v, record.p))
         self.z = record.z.reshape(count, *many)
@@ -239,7 +239,7 @@ class Ensemble:
         return columns[name]
 
     def _columns(self):
-        names, velocities = self.system.coordinates, _core.velocity_names(self.system.given_coordinates)[1]
+        names, velocities = self._coordinates, _core.velocity_names(self.system.given_coordinates)[1]
         columns = {}
         for of, array in ((names, self.q), (velocities, self.v), ([f"p_{name}" for name in names], self.p)):
             columns |= {name: array[..., i] for i, name in enumerate(of)}
@@ -302,7 +302,7 @@ class Ensemble:
         data = {name: ((*along, "coordinate"), getattr(self, name)) for name in ("q", "v", "p")}
         data |= {"z": (along, self.z)} | {name: (along, column) for name, column in self._observed.items()}
         data |= {"success": ("member", self.success), "steps": ("member", self.steps)}
-        axes = {"coordinate": self.system.coordinates}
+        axes = {"coordinate": self._coordinates}
         if self.times is None:
             data["reached"] = ("member", self.t)
         else:
@@ -317,7 +317,7 @@ class Ensemble:
         matplotlib.axes.Axes
         """
         ax = axes_of(ax)
-        names, velocities = self.system.coordinates, _core.velocity_names(self.system.given_coordinates)[1]
+        names, velocities = self._coordinates, _core.velocity_names(self.system.given_coordinates)[1]
         i = names.index(coordinate) if isinstance(coordinate, str) else coordinate
         if self.times is None:
             ax.plot(self.q[:, i], self.v[:, i], ".", markersize=3)

@@ -63,14 +63,16 @@ def sensitivity_of(system, request, names):
     """The derivatives of the rows of the members of a request with respect to variables."""
     (q, v, p), z, growth, troubles = _core.ensemble_sensitivity(system, request, names)
     shape = *_shape(request), len(names)
-    q, v, p = (x.reshape(*shape, system.dimension).transpose(0, 1, 3, 2) for x in (q, v, p))
+    n = len(coordinates_with(system, request[6]))
+    q, v, p = (x.reshape(*shape, n).transpose(0, 1, 3, 2) for x in (q, v, p))
     return EnsembleSensitivity(q, v, p, z.reshape(shape), growth, dict(troubles))
 
 
 def pullback_of(system, request, q=None, v=None, p=None, z=None):
     """The gradients of numbers with these partial derivatives in the rows of the members of a request."""
     shape = _shape(request)
-    parts = [partials(name, x, (*shape, system.dimension), 1) for name, x in (("q", q), ("v", v), ("p", p))]
+    n = len(coordinates_with(system, request[6]))
+    parts = [partials(name, x, (*shape, n), 1) for name, x in (("q", q), ("v", v), ("p", p))]
     return _gradient(system, request, _core.ensemble_pullback(system, request, parts, partials("z", z, shape, 1)))
 
 

@@ -28,8 +28,10 @@ class Event:
         first and the last law are contact transformations.
     rest : function or dict of str, optional
         The state from which the motion continues where resets or impacts accumulate, in the form of `reset`. Without it
-        the motion ends there. Forces must then keep the state, as with a coordinate m without forces that changes by
-        resets alone: ``force={"x": "-(1 - m)*g"}`` with ``rest={"x": "0", "x'": "0", "m": "1"}``.
+        the motion ends there. Where it assigns the velocity of the surface to the one coordinate x on which `when`
+        depends, as ``rest={"x'": "0"}`` for ``"x"``, the motion stays on the surface until the force pulls it off, and has the
+        coordinate ``contact_x`` in addition: 1 in contact (-1 where `when` was negative before), 0 in flight. Any other
+        state must leave the surface, or switch the force off by a coordinate.
 
     Examples
     --------
@@ -81,6 +83,12 @@ def texts_of_events(events):
 def has_reset(event):
     """Whether the state changes at an event in the form of the core."""
     return event[3] is not None
+
+
+def coordinates_with(system, events):
+    """The names of the coordinates, with those of the modes of resting contact that events in the form of the core add."""
+    has_rest = any(change is not None and change[2] is not None for *_, change in events)
+    return _core.coordinates_of(system, events) if has_rest else system.coordinates
 
 
 def _change_of(event, text, system, tables):

@@ -103,7 +103,7 @@ def sensitivity(sol, variables):
     of_events = list(events.values() if isinstance(events, dict) else events)
     crossings = [(i, t) for i, of in enumerate(of_events) for t in of.t.tolist()]
     (q, v, p), z, growth, slopes = _core.sensitivity(_core.Motion(sol.system, *sol._request), names, times, crossings)
-    shape = len(times), len(names), sol.system.dimension
+    shape = len(times), len(names), len(sol._coordinates)
     q, v, p = (x.reshape(shape).transpose(0, 2, 1) for x in (q, v, p))
     z, slopes = z.reshape(shape[:2]), slopes.reshape(len(crossings), len(names))
     if is_one:
@@ -123,7 +123,7 @@ def start_time(request):
 
 def pullback(sol, q=None, v=None, p=None, z=None):
     """See `Solution.pullback`."""
-    k, n = len(sol.t), sol.system.dimension
+    k, n = len(sol.t), len(sol._coordinates)
     _check(sol)
     parts = [partials(name, x, (k, n), 0).tolist() for name, x in (("q", q), ("v", v), ("p", p))]
     motion = _core.Motion(sol.system, *sol._request)

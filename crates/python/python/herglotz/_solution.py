@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _core
+from ._events import coordinates_with
 from ._rows import Rows
 from ._watch import Watch
 
@@ -105,6 +106,7 @@ class Solution(Rows):
 
     def __init__(self, system, request, record, event_names, observed):
         self.system = system
+        self._coordinates = coordinates_with(system, request[4])
         self._request = request
         self.t, self.q, self.v, self.p, self.z = record.t, record.q, record.v, record.p, record.z
         self.energy, self.log_factor = record.energy, record.log_factor
@@ -115,7 +117,7 @@ class Solution(Rows):
         self._observed = observed
         self._observed_rows = record.columns
         kinds = [Crossings if event[3] is None else Resets for event in request[4]]
-        self.events = crossings(kinds, record.crossings, event_names, system.dimension) if event_names else []
+        self.events = crossings(kinds, record.crossings, event_names, len(self._coordinates)) if event_names else []
         self._event_names = event_names
         self._plan = self._dense = None
 
@@ -138,10 +140,11 @@ class Solution(Rows):
         q, p, z = np.array(q), np.array(p), np.nan if z is None else z
         v = np.full(len(q), np.nan) if v is None else np.array(v)
         try:
+            n = self.system.dimension
             if self.system.kind[0]:
                 energy = _core.hamiltonian_geometry(self.system, (t, q, p, z))["hamiltonian"]
             else:
-                energy = _core.geometry(self.system, (t, q, v, z))["energy"]
+                energy = _core.geometry(self.system, (t, q[:n], v[:n], z))["energy"]
         except ValueError:
             # Systems whose geometry is not computed, as those with constraints; the motion is run once more.
             energy = float(self(t).energy)
@@ -158,7 +161,7 @@ class Solution(Rows):
         """A column by name: observed, a coordinate, a velocity ``x'``, ``t``, ``z``, ``energy`` or ``log_factor``."""
         if name in self._observed:
             return self._observed_rows[:, self._observed.index(name)]
-        names = self.system.coordinates
+        names = self._coordinates
         for array, of in ((self.q, names), (self.v, _core.velocity_names(self.system.given_coordinates)[1])):
             if name in of:
                 return array[:, of.index(name)]
@@ -170,7 +173,7 @@ class Solution(Rows):
         )
 
     def _names(self):
-        return [*self.system.coordinates, *_core.velocity_names(self.system.given_coordinates)[1], *self._observed]
+        return [*self._coordinates, *_core.velocity_names(self.system.given_coordinates)[1], *self._observed]
 
     def __call__(self, t):
         """Dense output: the states at any times of the motion, as accurate as its steps.
@@ -350,10 +353,10 @@ class Solution(Rows):
             data["log_factor"] = ("t", self.log_factor)
         data |= {name: ("t", self[name]) for name in self._observed}
         attributes = {"lagrangian": self.system.lagrangian, "status": self.status}
-        return data, {"coordinate": self.system.coordinates}, attributes
+        return data, {"coordinate": self._coordinates}, attributes
 
     def _plotted(self):
-        return self.system.coordinates
+        return self._coordinates
 
     def __getstate__(self):
         # The ends of the steps are recomputed when they are needed.

@@ -34,9 +34,20 @@ pub(super) fn checked(formula: &Formula, what: &'static str, numbers: &[f64]) ->
     }
 }
 
-/// A start with the modes of friction, from one without them.
+/// A start with the modes of friction and of resting contact, from one without them.
 fn completed(formula: &Formula, start: &Start) -> Option<Start> {
-    let InitialVelocity::Velocity(v) = &start.velocity else { return None };
+    let v = match &start.velocity {
+        InitialVelocity::Velocity(v) => v,
+        // Whether a coordinate sticks depends on its velocity; without friction the modes are those of free coordinates.
+        InitialVelocity::Momentum(p)
+            if !formula.has_friction() && [start.q.len(), p.len()] == [formula.given_dimension(); 2] =>
+        {
+            let (mut p, mut q) = (p.clone(), start.q.clone());
+            [&mut q, &mut p].into_iter().for_each(|x| x.resize(formula.dimension(), 0.0));
+            return Some(Start { q, velocity: InitialVelocity::Momentum(p), ..start.clone() });
+        }
+        _ => return None,
+    };
     if !start.q.iter().chain(v).chain([&start.t, &start.z]).all(|x| x.is_finite()) {
         return None;
     }
@@ -44,10 +55,16 @@ fn completed(formula: &Formula, start: &Start) -> Option<Start> {
     Some(Start { q, velocity: InitialVelocity::Velocity(v), ..start.clone() })
 }
 
-/// Refuses motions backward in time with friction, where the time at which a coordinate came to stick is lost.
+/// Refuses motions backward in time with friction and resting contact, where the time at which a coordinate came to stick or
+/// to rest is lost.
 pub(crate) fn check_direction(formula: &Formula, start: f64, end: f64) -> Result<(), RuntimeError> {
-    if formula.has_friction() && end < start {
-        let why = "runs backward, but a motion with friction that sticks has no unique past; give a later time";
+    if end < start {
+        let what = match (formula.has_friction(), formula.has_resting_contact()) {
+            (true, _) => "friction that sticks",
+            (_, true) => "a contact that comes to rest",
+            (false, false) => return Ok(()),
+        };
+        let why = format!("runs backward, but a motion with {what} has no unique past; give a later time");
         return Err(RuntimeError::argument("t", why));
     }
     Ok(())

@@ -328,7 +328,7 @@ fn a_motion_that_is_pressed_into_a_corner_ends_there() {
                     };
                     assert!((t - time).abs() <= ROUND_OFF, "{what} by {by:?}: {t}");
                 }
-                Err(refused) => assert!(refused.contains("contact that lasts"), "{what}: {refused}"),
+                Err(refused) => assert!(refused.contains("is pressed onto it"), "{what}: {refused}"),
             }
         }
     }
