@@ -8,7 +8,7 @@ use crate::names::Names;
 use crate::node::Inputs;
 use crate::parser::{Parser, ValueName};
 use crate::tape::Tape;
-use crate::{Formula, FormulaError, Graph, Id};
+use crate::{Formula, FormulaError, Graph, Id, Node};
 use contact_geom::Scalar;
 
 /// The number of coordinates up to which an evaluation with the conformal factor does not allocate.
@@ -140,6 +140,15 @@ impl Expression {
     /// Whether the expression depends on the action.
     pub fn has_action(&self) -> bool {
         self.inputs.meets(Inputs::ACTION)
+    }
+
+    /// The number of the mode of [friction](Formula::with_friction) or of [resting contact](Formula::with_resting_contact) that
+    /// the expression is by itself, among the coordinates; `None` for any other expression.
+    pub fn mode(&self, of: &Formula) -> Option<usize> {
+        match self.graph.node(self.root) {
+            Node::Position(k) if k as usize >= of.given_dimension() => Some(k as usize),
+            _ => None,
+        }
     }
 
     /// The times of kinks and jumps that are known from the text, in ascending order, as 5 in `if(t > 5, 1, 0)`.

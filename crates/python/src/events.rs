@@ -21,26 +21,27 @@ pub fn events(given: Vec<GivenEvent<'_>>, of: &System) -> PyResult<(herglotz_run
     let mut formula = of.formula.clone();
     let mut events = Vec::with_capacity(given.len());
     for (text, direction, terminal, change) in given {
-        let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
         let direction = self::direction(&text, &direction)?;
-        let mut event = Event { direction, terminal, ..Event::new(function) };
+        let reset = change.is_some().then(|| formula.resets());
         if let Some(change) = change {
-            event.reset = Some(formula.resets());
+            named("the event", &text, formula.expression(&text).map_err(Into::into))?;
             formula = with_change(&formula, &text, direction, change)?;
         }
-        events.push((text, event));
+        events.push((text, direction, terminal, reset));
     }
-    if formula.resets() == of.formula.resets() {
-        return Ok((of.inner.clone(), events.into_iter().map(|(_, event)| event).collect()));
+    let has_resets = formula.resets() > of.formula.resets();
+    if has_resets {
+        formula = formula.with_resting_contact().map_err(value_error)?;
     }
-    let formula = formula.with_resting_contact().map_err(value_error)?;
-    // In the coordinates with those of the contacts.
-    let events = events.into_iter().map(|(text, event)| {
+    // In the coordinates with the modes of the contacts.
+    let events = events.into_iter().map(|(text, direction, terminal, reset)| {
         let function = named("the event", &text, formula.expression(&text).map_err(Into::into))?;
-        Ok(Event { function, ..event })
+        Ok(Event { direction, terminal, reset, ..Event::new(function) })
     });
     let events = events.collect::<PyResult<_>>()?;
-    Ok((herglotz_runtime::System::new(&formula).map_err(value_error)?, events))
+    let inner =
+        if has_resets { herglotz_runtime::System::new(&formula).map_err(value_error)? } else { of.inner.clone() };
+    Ok((inner, events))
 }
 
 /// The names of the coordinates of a system with the resets of events, with those of the modes of resting contact.

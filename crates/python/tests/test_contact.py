@@ -62,3 +62,20 @@ def test_what_has_no_contact():
         hz.solve(q0=[1.0], v0=[0.0], t=[0.0, -1.0], **BALL)
     with pytest.raises(ValueError, match="`q0` has 3 numbers, but the system has 1 coordinates"):
         hz.solve(q0=[1.0, 0.0, 0.0], v0=[0.0, 0.0, 0.0], t=1.0, **BALL)
+
+
+def test_changes_of_the_mode_are_events():
+    """A ball without restitution leaves a plate a sin t where a sin t = g, with dt/da = -g/(a sqrt(a^2 - g^2))."""
+    plate = hz.Event("x - a*sin(t)", "falling", reset={"x'": "a*cos(t)"}, rest={"x'": "a*cos(t)"})
+    events = {"meets": plate, "changes": "contact_x", "leaves": hz.Event("contact_x", "falling")}
+    given = dict(coordinates=["x"], parameters={"a": 2.0}, accuracy=1e-11, events=events)
+    sol = hz.solve("x'^2/2 - x", [0.0], [2.0], 9.0, **given)
+    released = np.arcsin(0.5) + np.array([0, 2 * np.pi])
+    assert np.allclose(sol.events["leaves"].t, released, rtol=0, atol=1e-9)
+    changes = sol.events["changes"]
+    assert isinstance(changes, hz.Crossings) and changes.q[:, 1].tolist() == [0, 1, 0]
+    assert changes.t[1] == sol.events["meets"].t[0]
+    found = sol.sensitivity("a").event_times
+    assert np.allclose(found["leaves"], -1 / (2 * np.sqrt(3)), rtol=0, atol=1e-8)
+    with pytest.raises(ValueError, match="do not end a motion"):
+        hz.solve("x'^2/2 - x", [0.0], [2.0], 9.0, **given | dict(events=[plate, hz.Event("contact_x", terminal=True)]))

@@ -22,6 +22,20 @@ def test_a_block_sticks_slips_and_sticks_again():
     assert mode[t < 3.33].max() == 0 and mode[(t > 3.34) & (t < 5)].min() == 1
 
 
+def test_the_times_of_sticking_and_slipping_are_events():
+    events = {"changes": "slip_x", "slips": hz.Event("slip_x", "rising"), "sticks": hz.Event("slip_x", "falling")}
+    sol = hz.solve(**BLOCK, t=20.0, friction=BELT, events=events, accuracy=1e-11)
+    # It sticks until x = u t = 1, and slips for twice the time in which x = 0.6 + 0.4 cos t + 0.3 sin t comes to its largest value
+    # less pi: until the velocity is 0.3 again.
+    slips = 2 * (np.pi - np.arctan2(0.4, 0.3))
+    assert sol.events["slips"].t[0] == pytest.approx(1 / 0.3, abs=1e-9)
+    assert sol.events["sticks"].t[0] == pytest.approx(1 / 0.3 + slips, abs=1e-9)
+    changes = sol.events["changes"]
+    assert changes.q[:, 1].tolist() == [1, 0] * (len(changes.t) // 2)
+    # x = fs/k is reached at fs/(k u).
+    assert sol.sensitivity("k").event_times["slips"][0] == pytest.approx(-1 / 0.3, abs=1e-8)
+
+
 @pytest.mark.parametrize(
     "friction",
     [{"x": "mu*9.81"}, {"x": ("coulomb", "mu", 9.81)}, {"x": ("coulomb", 0.3, lambda t, q, v, z: 9.81 + 0 * t)}, {"x": {"sliding": "mu*9.81"}}],

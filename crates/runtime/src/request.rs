@@ -81,7 +81,8 @@ pub enum Direction {
     Both,
 }
 
-/// A function of time and state whose sign changes are located.
+/// A function of time and state whose sign changes are located. Those of a mode of friction or of resting contact, as
+/// `slip_x` or `contact_x` by itself, are its changes, at each of which the state is that after it.
 #[derive(Clone, Debug)]
 pub struct Event {
     /// The function.

@@ -2,10 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Tests unwrap, in helpers too.
 
+use crate::event_times::crossings;
 use formula_lagrangian::{Direction, Reset};
 use herglotz_runtime::{
-    AnyIntegrator, Column, Formula, Impact, InitialVelocity, Motion, OutputTimes, Start, Status, StepControl, Steps,
-    System,
+    AnyIntegrator, Column, Direction as SignChanges, Event, Formula, Impact, InitialVelocity, Motion, OutputTimes,
+    Start, Status, StepControl, Steps, System,
 };
 
 fn ways() -> [StepControl; 3] {
@@ -109,6 +110,32 @@ fn a_ball_on_a_plate() {
             assert!((x - expected).abs() < 1e-7 && (v - rate).abs() < 1e-7, "{what}");
             assert!(contact == f64::from(u8::from(!flies)), "{what}");
         }
+    }
+}
+
+/// The changes of a mode are events: the state is that after them. They do not end a motion.
+#[test]
+fn changes_of_the_mode_are_events() {
+    let ball = Formula::parse("x'^2/2 - g*x", &["x"], &[("g", 1.0), ("a", 2.0)]).unwrap();
+    let system = with_reset(&ball, "x - a*sin(t)", Direction::Falling, "0", ["x'", "a*cos(t)"]);
+    let event = |text: &str| Event::new(system.formula().expression(text).unwrap());
+    let events = vec![
+        event("contact_x"),
+        Event { direction: SignChanges::Rising, ..event("contact_x") },
+        Event { direction: SignChanges::Falling, ..event("contact_x") },
+        Event { reset: Some(0), ..event("x") },
+    ];
+    for way in ways() {
+        let motion = Motion { events: events.clone(), ..Motion::new(Start::new(0.0, [0.0], [2.0], 0.0), 18.0, way) };
+        let found = crossings(&system, &motion);
+        let times = |event: usize| found.iter().filter(|at| at.event == event).map(|at| at.t).collect::<Vec<f64>>();
+        let released = f64::asin(0.5);
+        let expected: Vec<f64> = (0..3).map(|k| released + f64::from(k) * std::f64::consts::TAU).collect();
+        assert_eq!((times(0).len(), times(1)), (6, times(3)), "{way:?}");
+        assert!(times(2).iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-8) && times(2).len() == 3, "{way:?}");
+        let terminal = vec![Event { terminal: true, ..event("contact_x") }];
+        let refused = system.run(&Motion { events: terminal, ..motion }, &mut ()).unwrap_err().to_string();
+        assert!(refused.contains("do not end a motion"), "{refused}");
     }
 }
 

@@ -207,6 +207,11 @@ pub(super) fn check_events(lagrangian: &dyn Observed, events: &[crate::Event]) -
         let why = "is given for a terminal event, which ends the motion before its reset; remove one of the two";
         return Err(RuntimeError::argument("reset", why));
     }
+    if events.iter().any(|event| event.terminal && mode(lagrangian, event).is_some()) {
+        let why = "is given for the changes of a mode, which do not end a motion; give a function whose sign changes there, \
+                   such as the velocity relative to the surface";
+        return Err(RuntimeError::argument("terminal", why));
+    }
     if events.iter().any(|event| event.reset.is_some_and(|reset| reset >= lagrangian.resets())) {
         return Err(RuntimeError::argument(
             "reset",
@@ -255,9 +260,11 @@ fn at_states<'r>(
 /// The events of a motion, with the data needed to evaluate them.
 pub(super) struct Crossings<'r> {
     lagrangian: &'r dyn Observed,
-    /// The events without a reset, whose sign changes are searched for, and their indices.
+    /// The events whose sign changes are searched for, and their indices.
     events: Events<'r>,
     searched: Vec<usize>,
+    /// The events at which a mode changes, which are at resets, with the number of the mode.
+    modes: Vec<(usize, usize)>,
     /// The events as they were requested.
     requested: &'r [crate::Event],
     /// `L_z`, where it is constant: `check_events` ensures that it is known where a column needs it.
@@ -283,12 +290,16 @@ impl<'r> Crossings<'r> {
         let (start_time, velocity, inverse_mass) = (Cell::new(0.0), RefCell::new(v), RefCell::new(None));
         let context = Rc::new(EventContext { start_time, velocity, inverse_mass });
         let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
-        let searched: Vec<usize> = (0..events.len()).filter(|i| events[*i].reset.is_none()).collect();
+        let modes = events.iter().enumerate().filter_map(|(i, event)| Some((i, mode(lagrangian, event)?)));
+        let modes: Vec<(usize, usize)> = modes.collect();
+        let is_searched = |i: &usize| events[*i].reset.is_none() && modes.iter().all(|(of_mode, _)| of_mode != i);
+        let searched: Vec<usize> = (0..events.len()).filter(is_searched).collect();
         let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));
         (!events.is_empty()).then(|| Crossings {
             lagrangian,
             events: all,
             searched,
+            modes,
             requested: events,
             rate: lagrangian.constant_rate().unwrap_or(f64::NAN),
             action,
@@ -381,9 +392,22 @@ impl<'r> Crossings<'r> {
         let count = found.len();
         for Reset { t, index, before, after } in at.resets() {
             let Some(reset) = self.lagrangian.reset_of(*index) else { continue };
-            let Some(event) = self.requested.iter().position(|event| event.reset == Some(reset)) else { continue };
-            if end.is_none_or(|end| if self.backward { *t >= end } else { *t <= end }) {
+            if !end.is_none_or(|end| if self.backward { *t >= end } else { *t <= end }) {
+                continue;
+            }
+            if let Some(event) = self.requested.iter().position(|event| event.reset == Some(reset)) {
                 found.push((event, *t, before.clone(), Some(after.clone())));
+            }
+            for (event, mode) in &self.modes {
+                let change = after.q[*mode] - before.q[*mode];
+                let counts = match self.requested.get(*event).map(|event| event.direction) {
+                    Some(Direction::Rising) => change > 0.0,
+                    Some(Direction::Falling) => change < 0.0,
+                    _ => change != 0.0,
+                };
+                if counts {
+                    found.push((*event, *t, after.clone(), None));
+                }
             }
         }
         if found.len() > count {
@@ -395,6 +419,11 @@ impl<'r> Crossings<'r> {
 
 /// A crossing: the index of the event, the time, the state, and that after a reset.
 type Found = (usize, f64, State, Option<State>);
+
+/// The mode of friction or of resting contact whose changes an event is, if its function is one by itself.
+fn mode(lagrangian: &dyn Observed, event: &crate::Event) -> Option<usize> {
+    event.function.mode(lagrangian.formula()).filter(|_| event.reset.is_none())
+}
 
 fn of<'r>(lagrangian: &'r dyn Observed, event: &'r crate::Event, context: Rc<EventContext>) -> Event<'r> {
     let found = Event::new(at_states(lagrangian, &event.function, context));
