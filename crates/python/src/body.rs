@@ -270,10 +270,65 @@ pub fn run_rigid_body(
             record.interrupted = Some(raised.into_value(py).into_any());
             return Ok(record);
         }
-        let BodyDerivatives { in_start, in_parameters, log_factor, contact_defect } = found.map_err(value_error)?;
+        let BodyDerivatives { in_start, in_parameters, log_factor, contact_defect, .. } = found.map_err(value_error)?;
         record.derivatives = Some((by_rows(py, &in_start)?, by_rows(py, &in_parameters)?, log_factor, contact_defect));
     }
     Ok(record)
+}
+
+/// The derivatives of rows in the start and in the parameters, one column for each: those of the body coordinates, seven rows for each
+/// time; those of the columns, nineteen rows for each; those of the times of sign changes, a row for each; the derivatives in
+/// time of the columns at the last time; the logarithm of the conformal factor there.
+type BodySensitivity = ([Py<PyArray2<f64>>; 3], Py<PyArray1<f64>>, f64);
+
+/// The derivatives of the states of a motion at times along it, and of the times of sign changes of its events.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are those of the function of Python")]
+pub fn rigid_body_sensitivity(
+    py: Python<'_>,
+    body: BodyRequest<'_>,
+    start: StartRequest<'_>,
+    t: Bound<'_, PyAny>,
+    way: WayRequest<'_>,
+    events: Vec<EventRequest>,
+    times: Vec<f64>,
+    crossings: Vec<(usize, f64)>,
+) -> PyResult<BodySensitivity> {
+    let (body, motion, signals) = interruptible(&body, &start, (&t, None), way, events)?;
+    let mut all: Vec<f64> = times.iter().copied().chain(crossings.iter().map(|(_, t)| *t)).collect();
+    all.sort_by(|a, b| if motion.end < motion.t { b.total_cmp(a) } else { a.total_cmp(b) });
+    all.dedup();
+    let found = py.detach(|| body.derivatives_at(&motion, &all));
+    if let Some(raised) = signals.take() {
+        return Err(raised);
+    }
+    let found = found.map_err(value_error)?;
+    let at = |t: f64| all.iter().position(|x| *x == t).and_then(|i| found.get(i));
+    let mut parts: [Vec<f64>; 3] = Default::default();
+    for at in times.iter().filter_map(|t| at(*t)) {
+        let BodyDerivatives { in_start, in_parameters, of_columns, .. } = at;
+        for (start, parameters) in in_start.row_iter().zip(in_parameters.row_iter()) {
+            parts[0].extend(start.iter().chain(parameters.iter()));
+        }
+        of_columns.row_iter().for_each(|row| parts[1].extend(row.iter()));
+    }
+    for (event, t) in &crossings {
+        if let (Some(event), Some(at)) = (motion.events.get(*event), at(*t)) {
+            parts[2].extend(event.derivatives_of_time(at));
+        }
+    }
+    let Some(last) = times.last().and_then(|t| at(*t)) else { return Err(value_error("`t` is empty")) };
+    let width = last.of_columns.ncols();
+    let [coordinates, columns, slopes] = parts.map(|part| matrix(py, part, width));
+    Ok(([coordinates?, columns?, slopes?], vector(py, last.rates.to_vec()), last.log_factor))
+}
+
+/// The value of an expression of the columns at a row, with its partial derivatives.
+#[pyfunction]
+pub fn rigid_body_expression(text: &str, row: Vec<f64>) -> PyResult<(f64, Vec<f64>)> {
+    let of = crate::arrays::named("the loss", text, BodyEvent::parse(text))?;
+    let row = <[f64; 19]>::try_from(row).map_err(|_| value_error("a row has nineteen columns"))?;
+    Ok((of.value(&row), of.gradient(&row).to_vec()))
 }
 
 /// The plan of a motion: its text, the integrator, the length and the number of the steps, and the bound of the error.

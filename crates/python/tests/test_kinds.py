@@ -74,12 +74,6 @@ def ensemble(kind):
     return hz.ensemble(**kind.without_start() | rows, t=T, **kind.steps)
 
 
-def derivatives(kind):
-    if kind.column == "tip_z":
-        return hz.rigid_body(**BODY, omega=OMEGA, t=1.0, **STEPS, sensitivity=True).derivatives
-    return kind.run().sensitivity(kind.parameter)
-
-
 def reset(kind):
     velocity = {"x[0]": "x'[0]", "x_1": "x_1'"}.get(kind.column, "x'")
     return hz.Event(event(kind), reset={velocity: f"-{velocity}/2"})
@@ -117,7 +111,7 @@ CAPABILITIES = {
     "resume": lambda kind: kind.run().resume(1.5),
     "progress and callback": lambda kind: kind.run(callback=lambda sol: False, callback_interval=0.0),
     "ensemble": ensemble,
-    "derivatives": derivatives,
+    "derivatives": lambda kind: kind.run().sensitivity(kind.parameter),
     "adjoint": lambda kind: kind.run().pullback(q=np.eye(np.size(kind.given["v0" if "v0" in kind.given else "p0"]))[0]),
     "loss": lambda kind: hz.value_and_grad(kind.column)(**flat(kind), t=1.0, **kind.steps),
     "derivatives of times of events": lambda kind: kind.run(events=event(kind)).sensitivity(kind.parameter).event_times,
@@ -146,9 +140,6 @@ OTHERWISE = {
         "resets": "without a reset",
         "breaks": "is not there for rigid bodies",
         "compare": "a rigid body is not a formula",
-        "adjoint": NONE,
-        "loss": "a rigid body is not a formula",
-        "derivatives of times of events": NONE,
         "Lyapunov exponents": NONE,
         "fit": "a rigid body is not a formula",
         "own method": NONE,

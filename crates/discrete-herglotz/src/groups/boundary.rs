@@ -125,9 +125,10 @@ impl<G: LieGroup<N>, const N: usize> GroupEnds<G, N> {
         let h = integrator.step_size();
         let real = GroupState { g: self.g0, momentum: start.momentum.map(|p| p.re()), z: self.z0 };
         let velocity = integrator.velocity(self.t0, &real)?;
-        let (state, _) = after_steps(*start, velocity, self.steps, |k, state, velocity| {
-            integrator.step(self.t0 + k as f64 * h, state, velocity)
+        let ends = after_steps(*start, velocity, (h, self.t0), &[(self.steps, 0.0)], |(h, t), state, velocity| {
+            integrator.step_by(h, t, state, velocity)
         })?;
+        let state = ends.first().map_or(*start, |(state, _)| *state);
         let apart = G::log(&G::compose(&G::inverse(&G::lift(&self.g1, T::from)), &state.g));
         if !apart.iter().all(|x| x.re().is_finite()) {
             let what = "the distance from the final configuration";

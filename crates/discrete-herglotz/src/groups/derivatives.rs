@@ -61,20 +61,36 @@ pub(super) fn lifted<G: LieGroup<N>, const N: usize>(
     }
 }
 
-/// The state after a number of steps, with the logarithm of the conformal factor.
+/// Where derivatives are wanted: after a number of steps, and a further step of the given length, if it is not 0.
+pub type StepsAndRest = (usize, f64);
+
+/// A state that was reached, with the logarithm of the conformal factor.
+type EndOfSteps<G, T, const N: usize> = (GroupState<G, N, T>, f64);
+
+/// The states after numbers of steps of the length h from the time t0, in ascending order, with the logarithms of the
+/// conformal factor. A step is taken with its length, from a time.
 pub(super) fn after_steps<G: LieGroup<N>, T: Scalar, const N: usize>(
     start: GroupState<G, N, T>,
     velocity: SVector<f64, N>,
-    steps: usize,
-    step: impl Fn(usize, &GroupState<G, N, T>, &SVector<T, N>) -> Result<GroupStep<N, T>, GroupError>,
-) -> Result<(GroupState<G, N, T>, f64), GroupError> {
-    let (mut state, mut velocity, mut log_factor) = (start, velocity.map(T::from), 0.0);
-    for k in 0..steps {
-        let taken = step(k, &state, &velocity)?;
-        log_factor += taken.sigma_minus_one.re().ln_1p();
-        (state, velocity) = (state.after(&taken), taken.velocity);
+    (h, t0): (f64, f64),
+    ends: &[StepsAndRest],
+    step: impl Fn((f64, f64), &GroupState<G, N, T>, &SVector<T, N>) -> Result<GroupStep<N, T>, GroupError>,
+) -> Result<Vec<EndOfSteps<G, T, N>>, GroupError> {
+    let (mut at, mut taken) = ((start, velocity.map(T::from), 0.0), 0);
+    let after = |(state, velocity, log_factor): &(GroupState<G, N, T>, SVector<T, N>, f64), length: f64, k: usize| {
+        let step = step((length, t0 + k as f64 * h), state, velocity)?;
+        Ok((state.after(&step), step.velocity, log_factor + step.sigma_minus_one.re().ln_1p()))
+    };
+    let mut found = Vec::with_capacity(ends.len());
+    for (steps, rest) in ends {
+        while taken < *steps {
+            at = after(&at, h, taken)?;
+            taken += 1;
+        }
+        let (state, _, log_factor) = if *rest == 0.0 { at } else { after(&at, *rest, taken)? };
+        found.push((state, log_factor));
     }
-    Ok((state, log_factor))
+    Ok(found)
 }
 
 /// The derivatives of a state in body coordinates, one row for each coordinate.
@@ -105,15 +121,29 @@ impl<G: LieGroup<N>, const N: usize> GroupDerivatives<G, N> {
         start: &GroupState<G, N>,
         steps: usize,
     ) -> Result<Self, GroupError> {
+        only(Self::of_rows(integrator, t0, start, &[(steps, 0.0)])?)
+    }
+
+    /// The derivatives in the start after numbers of steps.
+    fn of_rows(
+        integrator: &impl GroupIntegrator<G, N>,
+        t0: f64,
+        start: &GroupState<G, N>,
+        ends: &[StepsAndRest],
+    ) -> Result<Vec<Self>, GroupError> {
         check(t0, start)?;
         let h = integrator.step_size();
         let velocity = integrator.velocity(t0, start)?;
-        let (end, log_factor) = after_steps(lifted(start, true), velocity, steps, |k, state, velocity| {
-            integrator.step(t0 + k as f64 * h, state, velocity)
+        let found = after_steps(lifted(start, true), velocity, (h, t0), ends, |(h, t), state, velocity| {
+            integrator.step_by(h, t, state, velocity)
         })?;
-        let (end, rows) = rows(&end)?;
-        let in_start = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| rows[i].component(j));
-        Ok(GroupDerivatives { start: *start, end, log_factor, in_start, in_parameters: DMatrix::zeros(2 * N + 1, 0) })
+        let of = |(end, log_factor): &EndOfSteps<G, Along<N>, N>| {
+            let (end, rows) = rows(end)?;
+            let in_start = DMatrix::from_fn(2 * N + 1, 2 * N + 1, |i, j| rows[i].component(j));
+            let in_parameters = DMatrix::zeros(2 * N + 1, 0);
+            Ok(GroupDerivatives { start: *start, end, log_factor: *log_factor, in_start, in_parameters })
+        };
+        found.iter().map(of).collect()
     }
 
     /// The derivatives in the start and in the parameters of the Lagrangian; each 2N + 1 parameters take one more run.
@@ -127,19 +157,37 @@ impl<G: LieGroup<N>, const N: usize> GroupDerivatives<G, N> {
         start: &GroupState<G, N>,
         steps: usize,
     ) -> Result<Self, GroupError> {
-        let mut found = Self::new(integrator, t0, start, steps)?;
+        only(Self::of_rows_with_parameters(integrator, t0, start, &[(steps, 0.0)])?)
+    }
+
+    /// The same at several places of one motion, in ascending order: after numbers of steps, and further steps of other
+    /// lengths.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn of_rows_with_parameters(
+        integrator: &impl ParametricGroupIntegrator<G, N>,
+        t0: f64,
+        start: &GroupState<G, N>,
+        ends: &[StepsAndRest],
+    ) -> Result<Vec<Self>, GroupError> {
+        let mut found = Self::of_rows(integrator, t0, start, ends)?;
         let (h, parameters) = (integrator.step_size(), integrator.parameters());
         let velocity = integrator.velocity(t0, start)?;
-        found.in_parameters = DMatrix::zeros(2 * N + 1, parameters.len());
+        for at in &mut found {
+            at.in_parameters = DMatrix::zeros(2 * N + 1, parameters.len());
+        }
         for first in (0..parameters.len()).step_by(2 * N + 1) {
             let direction = |k: usize| (first..=first + 2 * N).contains(&k).then(|| k - first);
             let theta: Vec<_> = parameters.iter().enumerate().map(|(k, x)| seeded::<N>(*x, direction(k))).collect();
-            let (end, _) = after_steps(lifted(start, false), velocity, steps, |k, state, velocity| {
-                integrator.step_at(&theta, (h, t0 + k as f64 * h), state, velocity)
+            let states = after_steps(lifted(start, false), velocity, (h, t0), ends, |step, state, velocity| {
+                integrator.step_at(&theta, step, state, velocity)
             })?;
-            for (i, row) in rows(&end)?.1.iter().enumerate() {
-                for k in first..parameters.len().min(first + 2 * N + 1) {
-                    found.in_parameters[(i, k)] = row.component(k - first);
+            for (at, (end, _)) in found.iter_mut().zip(&states) {
+                for (i, row) in rows(end)?.1.iter().enumerate() {
+                    for k in first..parameters.len().min(first + 2 * N + 1) {
+                        at.in_parameters[(i, k)] = row.component(k - first);
+                    }
                 }
             }
         }
@@ -168,6 +216,11 @@ impl<G: LieGroup<N>, const N: usize> GroupDerivatives<G, N> {
         let expected = form(&self.start).scale(self.log_factor.exp()).minus(*work);
         pullback.minus(expected).max_abs_or_nan() / pullback.max_abs_or_nan()
     }
+}
+
+/// The only one of a list.
+fn only<T>(mut found: Vec<T>) -> Result<T, GroupError> {
+    found.pop().ok_or(GroupError::NonFinite { what: "the number of ends", value: f64::NAN })
 }
 
 /// Checks the start of a motion.

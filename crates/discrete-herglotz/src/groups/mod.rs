@@ -37,7 +37,7 @@ pub use accuracy::{GroupSteps, group_distance, group_steps};
 pub use boundary::{GroupEnds, MotionBetween};
 pub use breaks::GroupBreaks;
 pub use dense::DenseGroupMotion;
-pub use derivatives::GroupDerivatives;
+pub use derivatives::{GroupDerivatives, StepsAndRest};
 pub use events::GroupEvent;
 pub use gauss::GroupGauss;
 pub use motion::GroupMotion;

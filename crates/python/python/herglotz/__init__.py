@@ -31,6 +31,7 @@ __version__ = "0.1.0"
 
 # Modules that a single motion does not need are loaded at first use: they are half of the import time.
 _LATER = {
+    "_body_derivatives": "RigidBodySensitivity",
     "_body": "RigidBody RigidBodyDerivatives RigidBodySolution RigidBodyStates body rigid_bodies rigid_body rigid_body_between",
     "_sparse": "SparseSolution SparseSystem bodies lattice",
     "_ensemble": "Ensemble MemberCrossings MemberResets ensemble",
@@ -97,6 +98,7 @@ __all__ = [
     "Retraction",
     "RigidBody",
     "RigidBodyDerivatives",
+    "RigidBodySensitivity",
     "RigidBodySolution",
     "RigidBodyStates",
     "Sensitivity",

@@ -224,7 +224,7 @@ class Gradient(NamedTuple):
     p0: Vector | None
     z0: float
     parameters: dict[str, float]
-    t0: float
+    t0: float | None
     t_end: float
     growth: float
     unresolved: str | None = None
@@ -379,6 +379,19 @@ class RigidBodyDerivatives:
     log_factor: float
     contact_defect: float
 
+class RigidBodySensitivity(NamedTuple):
+    turn: Vector
+    attitude: Vector
+    Pi: Vector
+    omega: Vector
+    M: Vector
+    tip: Vector
+    energy: Vector
+    z: Vector
+    growth: float
+    event_times: list[Vector]
+    end: RigidBodySensitivity | None
+
 class RigidBody:
     def with_parameters(self, parameters: Mapping[str, Any]) -> RigidBody: ...
 
@@ -405,6 +418,14 @@ class RigidBodySolution(RigidBodyStates):
         callback: Callable[[RigidBodySolution], Any] | None = None,
         callback_interval: float = 1.0,
     ) -> RigidBodySolution: ...
+    def sensitivity(self, variables: str | Sequence[str]) -> RigidBodySensitivity: ...
+    def pullback(
+        self,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+        p: ArrayLike | None = None,
+        z: ArrayLike | None = None,
+    ) -> Gradient: ...
 
 class Interrupted(KeyboardInterrupt):
     solution: Solution | SparseSolution | RigidBodySolution | Ensemble

@@ -117,7 +117,7 @@ class RigidBody(Composed):
         """There is none: its configurations are rotations, and not the coordinates of a formula."""
         raise ValueError(
             "a rigid body is not a formula, since its configurations are rotations: it has motions by `solve`, `check` and "
-            "`ensemble`, and derivatives by `rigid_body(..., sensitivity=True)`"
+            "`ensemble`, and derivatives by `Solution.sensitivity`, `Solution.pullback` and `value_and_grad`"
         )
 
     def with_parameters(self, parameters):
@@ -137,6 +137,17 @@ class RigidBody(Composed):
         way = tuple(given.pop(name, None) for name in ("accuracy", "integrator", "step", "steps"))
         t = given.pop("t")
         return _core.check_rigid_body(*_request(**given), copied(t), way, places)
+
+    def _value_and_grad(self, loss, arguments):
+        """The value and the gradient for the arguments of `value_and_grad`."""
+        from ._body_derivatives import value_and_gradient
+
+        if not isinstance(loss, str):
+            raise ValueError("the loss of a rigid body is a text over the columns of its rows, such as \"tip_z\"")
+        sol = self._solve(arguments)
+        if not sol.success:
+            raise ValueError(f"the motion is not completed: {sol.status}")
+        return value_and_gradient(sol, loss)
 
     def _ensemble(self, arguments):
         """The motions for the arguments of `ensemble`."""
@@ -307,6 +318,55 @@ class RigidBodySolution(RigidBodyStates):
         start = end.attitude[0], end.omega[0], float(end.z[0])
         way = None, self.integrator, abs(self.step_size), None
         return _solution((body, start, times, every, way, events, False), watch)
+
+    def sensitivity(self, variables):
+        """The derivatives of the rows, of the end and of the times of events with respect to variables.
+
+        They are those of the discrete motion, to round-off; those of a row between two steps are those after a shorter step. The
+        motion is run once more, by a Gauss method, whose steps were given or chosen.
+
+        Parameters
+        ----------
+        variables : str or list of str
+            The names of m variables: of the start ``"turn1"`` to ``"turn3"``, a turn of the attitude in the body, ``"omega1"`` to
+            ``"omega3"`` and ``"z"``; and the parameters ``"inertia11"``, ``"inertia12"``, ..., ``"mass"``, ``"centre1"``, ...,
+            ``"gravity1"``, ... and ``"gamma"``, for a fixed attitude and angular velocity at the start.
+
+        Returns
+        -------
+        RigidBodySensitivity
+
+        Examples
+        --------
+        >>> import herglotz as hz
+        >>> top = hz.body((1, 1, 0.5), mass=1.0, centre=(0, 0, 1), gravity=(0, 0, -9.81), gamma=-0.05)
+        >>> sol = hz.solve(top, v0=(0.1, 0, 20), t=[0, 1], integrator="gauss_4", step=0.01)
+        >>> sol.sensitivity("mass").tip.shape
+        (2, 3)
+        """
+        from ._body_derivatives import sensitivity
+
+        return sensitivity(self, variables, _PARTS)
+
+    def pullback(self, q=None, v=None, p=None, z=None):
+        """The gradient of a number with these partial derivatives in the rows.
+
+        Parameters
+        ----------
+        q, v, p : arrays of shape (k, 3), or (3,) for the last row only
+            The partial derivatives in turns of the attitude in the body, in the angular velocity and in the momentum Pi; those in v
+            and p are added.
+        z : array of shape (k,), or a number for the last row only
+
+        Returns
+        -------
+        Gradient
+            ``q0`` is the derivative in a turn of the initial attitude in the body, ``v0`` that in the initial angular velocity,
+            ``parameters`` has those of `sensitivity`. ``t0`` is None where it is not known: with a torque, or several rows.
+        """
+        from ._body_derivatives import pullback
+
+        return pullback(self, q, v, p, z)
 
     def __repr__(self):
         return f"<RigidBodySolution: {len(self.t)} rows, t = {self.t_end}, {self.steps} steps, {self.status}>"

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _core
 from ._arguments import Arguments
+from ._body import RigidBody
 from ._solve import request_of, solve
 from ._watch import watch_of
 
@@ -54,7 +55,7 @@ class Gradient(NamedTuple):
     p0: np.ndarray | None  # (n,)
     z0: float
     parameters: dict
-    t0: float
+    t0: float | None  # None for some of a rigid body
     t_end: float
     growth: float
     unresolved: str | None = None
@@ -187,6 +188,8 @@ def value_and_grad(loss):
         refuse_of_rows(given, "a loss is a number of the final state, and has no rows", "observe", "every", "conformal_factor", "estimate", "exact")
         refuse_of_rows(given, "a value and its gradient are computed in one call", "progress", "callback")
         watch_of(given)
+        if isinstance(given["L"], RigidBody):
+            return given["L"]._value_and_grad(loss, given)
         # As a column it is traced, and its parameters and tables are found.
         of, request, *_ = request_of(**given | {"observe": {"loss": loss}})
         (text,) = request[5]

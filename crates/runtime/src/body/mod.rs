@@ -2,6 +2,7 @@
 
 mod between;
 mod check;
+mod columns;
 mod derivatives;
 mod ensemble;
 mod integrator;

@@ -53,10 +53,20 @@ impl BodyEvent {
         Ok(BodyEvent { function, direction: Direction::Both, terminal: false })
     }
 
-    /// The value at a row.
-    pub(super) fn value(&self, row: &[f64; 19]) -> f64 {
+    /// The value at a row of the [columns](Body::COLUMNS).
+    pub fn value(&self, row: &[f64; 19]) -> f64 {
         let (t, z) = (row[0], row[18]);
         row.get(1..17).map_or(f64::NAN, |q| self.function.at(t, q, &[0.0; 16], z))
+    }
+
+    /// The partial derivatives at a row, in its columns.
+    pub fn gradient(&self, row: &[f64; 19]) -> [f64; 19] {
+        let (t, z) = (row[0], row[18]);
+        let found = self.function.gradient_at(t, row.get(1..17).unwrap_or_default(), &[0.0; 16], z);
+        let mut gradient = [0.0; 19];
+        gradient.iter_mut().zip(std::iter::once(&found.t).chain(&found.q)).for_each(|(to, from)| *to = *from);
+        gradient[18] = found.z;
+        gradient
     }
 }
 
