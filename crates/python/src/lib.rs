@@ -34,8 +34,8 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use crate::body::{
-        BodyRecord, check_rigid_body, plan_rigid_body, rigid_body_between, rigid_body_expression, rigid_body_parameters,
-        rigid_body_sensitivity, run_rigid_bodies, run_rigid_body,
+        BodyRecord, check_rigid_body, plan_rigid_body, rigid_body_between, rigid_body_expression,
+        rigid_body_parameters, rigid_body_sensitivity, run_rigid_bodies, run_rigid_body,
     };
     #[pymodule_export]
     use crate::checks::{check, compare, geometry, hamiltonian_geometry};

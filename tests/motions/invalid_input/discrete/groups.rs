@@ -34,6 +34,7 @@ pub const TESTS: &[InputTest] = &[
             "GroupDerivatives::contact_defect",
             "GroupDerivatives::gradients",
             "GroupDerivatives::new",
+            "GroupDerivatives::of_rows_with_parameters",
             "GroupDerivatives::with_parameters",
             "GroupEnds::search",
             "GroupGauss::virtual_work",
@@ -187,6 +188,10 @@ fn runs(report: &mut Report) {
         report.entry_point(&value, divided);
         let found = GroupDerivatives::new(&gauss, value, &start(GOOD), 3);
         report.entry_point(&value, found.map(|found| found.in_start.iter().copied().collect::<Vec<_>>()));
+        let found = GroupDerivatives::of_rows_with_parameters(&gauss, 0.0, &start(GOOD), &[(2, value)]);
+        let numbers =
+            |found: Vec<GroupDerivatives<Rotations, 3>>| found[0].in_parameters.iter().copied().collect::<Vec<_>>();
+        report.entry_point(&value, found.map(numbers));
         let dense = DenseGroupMotion::new(gauss.clone(), value, &start(GOOD), 3);
         report.entry_point(&value, dense.map(|dense| dense.span().to_vec()));
         let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(GOOD), 3);
