@@ -189,9 +189,9 @@ fn runs(report: &mut Report) {
         let found = GroupDerivatives::new(&gauss, value, &start(GOOD), 3);
         report.entry_point(&value, found.map(|found| found.in_start.iter().copied().collect::<Vec<_>>()));
         let found = GroupDerivatives::of_rows_with_parameters(&gauss, 0.0, &start(GOOD), &[(2, value)]);
-        let numbers =
+        let of_rows =
             |found: Vec<GroupDerivatives<Rotations, 3>>| found[0].in_parameters.iter().copied().collect::<Vec<_>>();
-        report.entry_point(&value, found.map(numbers));
+        report.entry_point(&value, found.map(of_rows));
         let dense = DenseGroupMotion::new(gauss.clone(), value, &start(GOOD), 3);
         report.entry_point(&value, dense.map(|dense| dense.span().to_vec()));
         let dense = DenseGroupMotion::new(gauss.clone(), 0.0, &start(GOOD), 3);
