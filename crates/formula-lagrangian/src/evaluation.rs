@@ -45,22 +45,23 @@ impl Tape {
     pub fn evaluate<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
         // Nested dual numbers are not evaluated in long computations, so that their registers may be on the heap.
         if T::ORDER > 0 || self.registers > REGISTERS_LARGE {
-            self.interpret::<T, N>(at, &mut vec![T::zero(); self.registers], results);
+            self.interpret_apart(at, &mut vec![T::zero(); self.registers], results);
         } else if self.registers <= REGISTERS_TINY {
             self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_TINY]).0, results);
         } else if self.registers <= REGISTERS_SMALL {
             self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_SMALL]).0, results);
         } else if self.registers <= REGISTERS_MEDIUM {
-            self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_MEDIUM]).0, results);
+            // Of a long program the copying of inputs and results is a small part.
+            self.interpret_apart(at, &mut OnStack([T::zero(); REGISTERS_MEDIUM]).0, results);
         } else {
-            self.evaluate_large::<T, N>(at, results);
+            self.evaluate_large(at, results);
         }
     }
 
     /// A separate function, so that the large array is in a stack frame of its own.
     #[inline(never)]
-    fn evaluate_large<T: Scalar, const N: usize>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
-        self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_LARGE]).0, results);
+    fn evaluate_large<T: Scalar>(&self, at: At<'_, T>, results: &mut [&mut [T]]) {
+        self.interpret_apart(at, &mut OnStack([T::zero(); REGISTERS_LARGE]).0, results);
     }
 
     /// The copying of inputs and results is inlined into the caller if there are few of them.

@@ -271,7 +271,8 @@ impl<const N: usize> Lagrangian<N> for FormulaLagrangian<N> {
         match &self.derived().applied {
             None => force,
             Some(tape) => {
-                tape.evaluate::<T, N>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
+                // Not inlined: it would be beside each evaluation of L, also where there is no force.
+                tape.evaluate::<T, 0>(At::new(t, &x.q, &x.v, x.z), &mut [force.as_mut_slice()]);
                 whole_vector(&force)
             }
         }

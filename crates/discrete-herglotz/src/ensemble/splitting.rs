@@ -88,11 +88,10 @@ impl<L: Lagrangian<N> + Sync, const N: usize> LaneKernel for SplittingPacks<'_, 
     /// finite at its start or at its end, its final state is not finite.
     fn run(&self, instructions: Instructions, lanes: &mut [Lane], action: bool, options: LaneOptions) {
         let stride = options.rows.unwrap_or(self.steps);
-        match (action, options.check_resolution) {
-            (true, true) => instructions.dispatch(All::<_, N, true, true> { packs: self, lanes, stride }),
-            (true, false) => instructions.dispatch(All::<_, N, true, false> { packs: self, lanes, stride }),
-            (false, true) => instructions.dispatch(All::<_, N, false, true> { packs: self, lanes, stride }),
-            (false, false) => instructions.dispatch(All::<_, N, false, false> { packs: self, lanes, stride }),
+        let checked = options.check_resolution.then_some(self.check.stage);
+        match action {
+            true => instructions.dispatch(All::<_, N, true> { packs: self, lanes, stride, checked }),
+            false => instructions.dispatch(All::<_, N, false> { packs: self, lanes, stride, checked }),
         }
     }
 }
@@ -102,27 +101,27 @@ impl<L: Lagrangian<N> + Sync, const N: usize> LaneKernel for SplittingPacks<'_, 
 const PACKS_IN_FLIGHT: usize = 4;
 
 /// All motions of a slice in the lanes of one instruction set.
-struct All<'s, 'a, L, const N: usize, const ACTION: bool, const CHECKED: bool> {
+struct All<'s, 'a, L, const N: usize, const ACTION: bool> {
     packs: &'s SplittingPacks<'a, L, N>,
     lanes: &'s mut [Lane],
     /// The number of steps from one recorded state to the next.
     stride: usize,
+    /// The stage whose drift is checked, if one is.
+    checked: Option<usize>,
 }
 
-impl<L: Lagrangian<N>, const N: usize, const ACTION: bool, const CHECKED: bool> WithSimd
-    for All<'_, '_, L, N, ACTION, CHECKED>
-{
+impl<L: Lagrangian<N>, const N: usize, const ACTION: bool> WithSimd for All<'_, '_, L, N, ACTION> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
-        let All { packs, lanes, stride } = self;
+        let All { packs, lanes, stride, checked } = self;
         // The registers of a pack share the constants that a stage reads; if a pack had more registers than the
         // processor, they would be spilled to memory.
         if const { N == 1 } {
-            packs.all::<S, 4, ACTION, CHECKED>(lanes, stride);
+            packs.all::<S, 4, ACTION>(lanes, stride, checked);
         } else {
-            packs.all::<S, 2, ACTION, CHECKED>(lanes, stride);
+            packs.all::<S, 2, ACTION>(lanes, stride, checked);
         }
     }
 }
@@ -174,7 +173,12 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     }
 
     #[inline(always)]
-    fn all<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(&self, lanes: &mut [Lane], stride: usize) {
+    fn all<S: Simd, const K: usize, const ACTION: bool>(
+        &self,
+        lanes: &mut [Lane],
+        stride: usize,
+        checked: Option<usize>,
+    ) {
         let width = SimdBatch::<S, K>::COUNT;
         for members in lanes.chunks_mut(PACKS_IN_FLIGHT * width) {
             let mut in_flight = [Pack::zero(); PACKS_IN_FLIGHT];
@@ -182,7 +186,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
             for (own, m) in members.chunks(width).zip(in_flight.iter_mut()) {
                 *m = Pack::from_lanes(own);
             }
-            let whole = self.take_steps::<S, K, ACTION, CHECKED>(in_flight, stride, |t, w, at| {
+            let whole = self.take_steps::<S, K, ACTION>(in_flight, stride, checked, |t, w, at| {
                 for (i, lane) in members.iter_mut().skip(w * width).take(width).enumerate() {
                     lane.record(t, at.state(i));
                     lane.suspect = at.suspect.lanes()[i] != 0.0;
@@ -197,10 +201,11 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
     /// Takes all steps, with the operations of a single run in the same order. `record` is called after each stride and
     /// at the end. Returns false if it was interrupted.
     #[inline(always)]
-    fn take_steps<S: Simd, const K: usize, const ACTION: bool, const CHECKED: bool>(
+    fn take_steps<S: Simd, const K: usize, const ACTION: bool>(
         &self,
         in_flight: &mut [Pack<S, K, N>],
         stride: usize,
+        checked: Option<usize>,
         mut record: impl FnMut(f64, usize, &Pack<S, K, N>),
     ) -> bool {
         let SplittingPacks { t0, h, steps, .. } = self;
@@ -220,7 +225,7 @@ impl<'a, L: Lagrangian<N>, const N: usize> SplittingPacks<'a, L, N> {
                 let stages = if k == 0 { &table.first } else { &table.joined };
                 for (i, stage) in stages.iter().enumerate() {
                     let time = t + stage.time;
-                    if CHECKED && i == self.check.stage {
+                    if checked == Some(i) {
                         for m in in_flight.iter_mut() {
                             let before = m.force;
                             self.kick_and_drift::<S, K, ACTION>(m, stage);

@@ -42,27 +42,25 @@ impl<L: Lagrangian<N>, const N: usize> GaussPacks<'_, L, N> {
             (m.continuing, m.convergence) = (one - m.failed, ConvergenceTest::new());
             (m.open, m.whole) = (m.continuing.any(), !m.failed.any());
         }
-        self.iterate_stages::<S, K, ACTION>(in_flight, if warm { &self.table.first } else { &self.table.b }, false, t);
-        let mut open = false;
-        for m in in_flight.iter_mut() {
-            self.begin(m, s, true);
-            (m.change, m.size) = (zero, zero);
-            open |= m.open;
-        }
+        let mut rows = if warm { &self.table.first } else { &self.table.b };
+        // The first iteration begins from the step before, and is not tested.
+        let (mut tested, mut open) = (false, true);
         while open {
-            self.iterate_stages::<S, K, ACTION>(in_flight, &self.table.b, true, t);
+            self.iterate_stages::<S, K, ACTION>(in_flight, rows, tested, t);
             open = false;
             for m in in_flight.iter_mut() {
-                if !m.open {
-                    continue;
+                if !tested {
+                    self.begin(m, s, true);
+                } else if m.open {
+                    let [continuing, failing] = m.convergence.test(m.change, m.size);
+                    m.failed += failing * m.continuing;
+                    m.continuing = m.continuing * continuing * (one - failing);
+                    (m.open, m.whole) = (m.continuing.any(), !(one - m.continuing).any());
                 }
-                let [continuing, failing] = m.convergence.test(m.change, m.size);
-                m.failed += failing * m.continuing;
-                m.continuing = m.continuing * continuing * (one - failing);
                 (m.change, m.size) = (zero, zero);
-                (m.open, m.whole) = (m.continuing.any(), !(one - m.continuing).any());
                 open |= m.open;
             }
+            (rows, tested) = (&self.table.b, true);
         }
         for (m, last) in in_flight.iter_mut().zip(&last) {
             self.check_resolution(m, warm.then_some(last), s);
