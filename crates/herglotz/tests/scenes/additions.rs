@@ -151,7 +151,8 @@ fn crossings(scene: &Scene) -> (Vec<Crossing>, Status) {
 fn a_scene_has_what_it_says() {
     let scene = read(ADDED).unwrap();
     let formula = scene.system.formula();
-    assert!(formula.has_forces() && formula.resets() == 2 && scene.system.symmetries().is_empty());
+    // The two of the events, and the end of the contact of the one with `rest`.
+    assert!(formula.has_forces() && formula.resets() == 3 && scene.system.symmetries().is_empty());
     let (found, status) = crossings(&scene);
     assert_eq!(status, Status::Completed, "{status}");
     let first: Vec<&Crossing> = found.iter().filter(|crossing| crossing.event == 0).collect();

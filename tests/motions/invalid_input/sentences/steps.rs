@@ -183,7 +183,7 @@ fn step_errors() {
         }, ["accumulate at t = ", "the motion continues"];
         StepError::Contact { .. } => {
             Impacting(Impact::Restitution(0.0)).fails()
-        }, ["rests at t = ", "pressed onto it", "end the run before it"];
+        }, ["rests at t = ", "pressed onto it", "end the run before"];
         StepError::JumpAlong { .. } => Switching::Fast.fails(), ["depends on the velocity", "smooth the jump"];
         StepError::NonFinite => {
             let ld = Rule::RECTANGLE.of(Kepler::<2>::default(), 0.1).unwrap();
