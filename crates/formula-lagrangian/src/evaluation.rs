@@ -51,8 +51,12 @@ impl Tape {
         } else if self.registers <= REGISTERS_SMALL {
             self.interpret::<T, N>(at, &mut OnStack([T::zero(); REGISTERS_SMALL]).0, results);
         } else if self.registers <= REGISTERS_MEDIUM {
-            // Of a long program the copying of inputs and results is a small part.
-            self.interpret_apart(at, &mut OnStack([T::zero(); REGISTERS_MEDIUM]).0, results);
+            let registers = &mut OnStack([T::zero(); REGISTERS_MEDIUM]).0;
+            // In lanes the copying of inputs and results is a small part of a long program.
+            match const { size_of::<T>() == size_of::<f64>() } {
+                true => self.interpret::<T, N>(at, registers, results),
+                false => self.interpret_apart(at, registers, results),
+            }
         } else {
             self.evaluate_large(at, results);
         }

@@ -7,6 +7,7 @@ import numpy as np
 from . import _core
 from ._arguments import Arguments
 from ._ensemble import ensemble, request_of
+from ._events import coordinates_with
 from ._sensitivity import names_of_variables, partials, refuse_of_rows
 
 
