@@ -399,7 +399,13 @@ METHODS = {
         ),
     ),
     "SparseSolution": (hz.lattice(**LATTICE), dict(resume=RESUME, __getitem__=dict(name=(dict(name="q[0]"), dict(name="v[1]"))))),
-    "RigidBodySolution": (hz.rigid_body(**BODY, integrator="gauss_4", steps=500), dict(resume=RESUME, __call__=dict(t=(dict(t=0.5), dict(t=0.6))), __getitem__=dict(name=(dict(name="tip_z"), dict(name="z"))))),
+    "RigidBodySolution": (
+        hz.rigid_body(**BODY, integrator="gauss_4", steps=500),
+        dict(
+            resume=RESUME, __call__=dict(t=(dict(t=0.5), dict(t=0.6))), __getitem__=dict(name=(dict(name="tip_z"), dict(name="z"))),
+            sensitivity=dict(variables=(dict(variables="gamma"), dict(variables="omega1"))), pullback={name: ({}, {name: 1.0 if name == "z" else np.ones(3)}) for name in PARTS},
+        ),
+    ),
     "RigidBody": (hz.body((1, 2, 3)), dict(with_parameters=dict(parameters=(dict(parameters={"mass": 1.0}), dict(parameters={"mass": 2.0}))))),
     "SparseSystem": (
         hz.bodies([1.0, 0.5], dimensions=2),

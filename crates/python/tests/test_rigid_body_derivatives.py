@@ -7,7 +7,7 @@ import pytest
 TOP = dict(inertia=[[1.0, 0.1, 0.0], [0.1, 1.4, -0.05], [0.0, -0.05, 0.7]], mass=0.8, centre=(0.1, -0.2, 0.5), gravity=(0.3, 0.0, -2.0), gamma=-0.1)
 OMEGA, T = np.array([0.3, -0.2, 2.0]), [0.0, 0.5, 0.93, 1.5]
 WAY = dict(integrator="gauss_4", step=0.05)
-EVENTS = ["tip_z - 0.35*t", "omega1 + q_x/3"]
+EVENTS = ["tip_y + 0.2*t - 0.05", "omega1 + q_x/3 - 0.5"]
 INERTIA = {"inertia11": (0, 0), "inertia12": (0, 1), "inertia13": (0, 2), "inertia22": (1, 1), "inertia23": (1, 2), "inertia33": (2, 2)}
 PARTS = "attitude", "Pi", "omega", "M", "tip", "energy", "z"
 
