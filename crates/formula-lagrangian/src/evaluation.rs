@@ -53,9 +53,10 @@ impl Tape {
         } else if self.registers <= REGISTERS_MEDIUM {
             let registers = &mut OnStack([T::zero(); REGISTERS_MEDIUM]).0;
             // In lanes the copying of inputs and results is a small part of a long program.
-            match const { size_of::<T>() == size_of::<f64>() } {
-                true => self.interpret::<T, N>(at, registers, results),
-                false => self.interpret_apart(at, registers, results),
+            if const { size_of::<T>() == size_of::<f64>() } {
+                self.interpret::<T, N>(at, registers, results);
+            } else {
+                self.interpret_apart(at, registers, results);
             }
         } else {
             self.evaluate_large(at, results);

@@ -278,8 +278,8 @@ pub fn run_rigid_body(
 
 /// The derivatives of rows in the start and in the parameters, one column for each: those of the body coordinates, seven rows for each
 /// time; those of the columns, nineteen rows for each; those of the times of sign changes, a row for each; the derivatives in
-/// time of the columns at the last time; the logarithm of the conformal factor there.
-type BodySensitivity = ([Py<PyArray2<f64>>; 3], Py<PyArray1<f64>>, f64);
+/// time of the columns at the last time.
+type BodySensitivity = ([Py<PyArray2<f64>>; 3], Py<PyArray1<f64>>);
 
 /// The derivatives of the states of a motion at times along it, and of the times of sign changes of its events.
 #[pyfunction]
@@ -320,7 +320,7 @@ pub fn rigid_body_sensitivity(
     let Some(last) = times.last().and_then(|t| at(*t)) else { return Err(value_error("`t` is empty")) };
     let width = last.of_columns.ncols();
     let [coordinates, columns, slopes] = parts.map(|part| matrix(py, part, width));
-    Ok(([coordinates?, columns?, slopes?], vector(py, last.rates.to_vec()), last.log_factor))
+    Ok(([coordinates?, columns?, slopes?], vector(py, last.rates.to_vec())))
 }
 
 /// The value of an expression of the columns at a row, with its partial derivatives.

@@ -44,7 +44,7 @@ def sensitivity(sol, variables, parts):
             raise ValueError(f"{name!r} is no variable of a rigid body: the variables are {', '.join(known)}")
     picked = [known.index(name) for name in names]
     pick = picked[0] if is_one else picked
-    coordinates, columns, slopes, rates, _ = _derivatives(sol)
+    coordinates, columns, slopes, rates = _derivatives(sol)
     # The end of the motion moves with a terminal event.
     moving = np.zeros(columns.shape[-1])
     terminal = [k for k, event in enumerate(sol._request[5]) if event[2] and len(sol.events[k].t)]
@@ -68,7 +68,7 @@ def pullback(sol, q=None, v=None, p=None, z=None):
     from ._sensitivity import partials
 
     k = len(sol.t)
-    coordinates, columns, _, rates, _ = _derivatives(sol)
+    coordinates, columns, _, rates = _derivatives(sol)
     of_q, of_v, of_p = (partials(name, x, (k, 3), 0).reshape(k, 3) for name, x in (("q", q), ("v", v), ("p", p)))
     of_z = partials("z", z, (k,), 0)
     coordinates, columns = coordinates[:k], columns[:k]
@@ -81,7 +81,7 @@ def pullback(sol, q=None, v=None, p=None, z=None):
 
 def value_and_gradient(sol, text):
     """The value of an expression of the columns at the end, and its gradient."""
-    coordinates, columns, _, rates, _ = _derivatives(sol)
+    coordinates, columns, _, rates = _derivatives(sol)
     value, slopes = _core.rigid_body_expression(text, sol.end._rows[0].tolist())
     slopes = np.array(slopes)
     return value, _gradient(sol, slopes @ columns[-1], slopes @ rates, slopes[0], coordinates)
@@ -101,7 +101,7 @@ def _gradient(sol, all, slope, of_time, coordinates):
 
 def _derivatives(sol):
     """The derivatives of the rows, and of the end after them: of the coordinates (k, 7, 21), of the columns (k, 19, 21), of the times of
-    events, the derivatives in time at the end, and the logarithm of the conformal factor."""
+    events, and the derivatives in time at the end."""
     body, start, t, _, _, events, _ = sol._request
     if not sol.success:
         raise ValueError(f"the motion has no derivatives, since it was not completed: {sol.status}")
@@ -110,9 +110,9 @@ def _derivatives(sol):
         times.append(sol.t_end)
     crossings = [(k, at) for k, of in enumerate(sol.events) for at in of.t.tolist()]
     found = _core.rigid_body_sensitivity(body, start, t, sol._way(), events, times, crossings)
-    (coordinates, columns, slopes), rates, log_factor = found
+    (coordinates, columns, slopes), rates = found
     k, width = len(times), len(_START) + len(_core.rigid_body_parameters())
-    return coordinates.reshape(k, 7, width), columns.reshape(k, 19, width), slopes.reshape(-1, width), rates, log_factor
+    return coordinates.reshape(k, 7, width), columns.reshape(k, 19, width), slopes.reshape(-1, width), rates
 
 
 def _rates_of_state(sol, rates):

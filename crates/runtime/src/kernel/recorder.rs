@@ -290,9 +290,8 @@ impl<'r> Crossings<'r> {
         let (start_time, velocity, inverse_mass) = (Cell::new(0.0), RefCell::new(v), RefCell::new(None));
         let context = Rc::new(EventContext { start_time, velocity, inverse_mass });
         let action = events.iter().flat_map(crate::Event::expressions).any(Expression::has_action);
-        let modes = events.iter().enumerate().filter_map(|(i, event)| Some((i, mode(lagrangian, event)?)));
-        let modes: Vec<(usize, usize)> = modes.collect();
-        let is_searched = |i: &usize| events[*i].reset.is_none() && modes.iter().all(|(of_mode, _)| of_mode != i);
+        let modes = events.iter().enumerate().filter_map(|(i, event)| Some((i, mode(lagrangian, event)?))).collect();
+        let is_searched = |i: &usize| events[*i].reset.is_none() && mode(lagrangian, &events[*i]).is_none();
         let searched: Vec<usize> = (0..events.len()).filter(is_searched).collect();
         let all = Events::new(searched.iter().map(|i| of(lagrangian, &events[*i], context.clone())));
         (!events.is_empty()).then(|| Crossings {
@@ -392,7 +391,7 @@ impl<'r> Crossings<'r> {
         let count = found.len();
         for Reset { t, index, before, after } in at.resets() {
             let Some(reset) = self.lagrangian.reset_of(*index) else { continue };
-            if !end.is_none_or(|end| if self.backward { *t >= end } else { *t <= end }) {
+            if end.is_some_and(|end| if self.backward { *t < end } else { *t > end }) {
                 continue;
             }
             if let Some(event) = self.requested.iter().position(|event| event.reset == Some(reset)) {
