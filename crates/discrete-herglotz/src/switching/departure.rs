@@ -63,7 +63,7 @@ impl Departure {
 
 impl Surfaces {
     /// The side to which a motion that is on a surface, up to a tolerance for the function, goes next; `None` if it is
-    /// not on the surface, or stays on it to third order. `h` is the length of a step.
+    /// not on the surface, or stays on it to second order. `h` is the length of a step.
     pub fn departure(
         &mut self,
         system: &dyn System,
@@ -76,13 +76,10 @@ impl Surfaces {
         if here.is_nan() || here.abs() > tolerance {
             return None;
         }
+        let motion = LocalMotion::at(system, t, x);
         // The change of a motion that is pressed onto the surface from rest may be round-off over a short time.
         let times = [1.0, LONGER, LONGER * LONGER].map(|factor| factor * DEPARTURE * h);
-        let mut along = |motion| {
-            times.into_iter().find_map(|dt| self.departure_within(system, index, &motion, (t, x, here), h, dt))
-        };
-        // A force that held the motion on the surface, and vanishes, leaves no acceleration.
-        along(LocalMotion::at(system, t, x)).or_else(|| along(LocalMotion::at(system, t, x).in_third_order()))
+        times.into_iter().find_map(|dt| self.departure_within(system, index, &motion, (t, x, here), h, dt))
     }
 
     /// The same by the motion within a time dt before and after the point, at which the function has the value `here`.

@@ -30,42 +30,31 @@ fn hamiltonian_motion(system: &dyn System, t: f64, x: &Point) -> Option<Componen
     field.is_finite().then_some(field)
 }
 
-/// The motion near a point, to second or third order in time.
+/// The motion near a point, to second order in time.
 pub(super) struct LocalMotion<'s> {
     system: &'s dyn System,
     t: f64,
     x: &'s Point,
     rates: Option<Components>,
-    third_order: bool,
 }
 
 impl<'s> LocalMotion<'s> {
     pub fn at(system: &'s dyn System, t: f64, x: &'s Point) -> Self {
-        LocalMotion { system, t, x, rates: rates_along_motion(system, t, x), third_order: false }
-    }
-
-    /// The same with the change of the acceleration.
-    pub fn in_third_order(self) -> Self {
-        LocalMotion { third_order: true, ..self }
+        LocalMotion { system, t, x, rates: rates_along_motion(system, t, x) }
     }
 
     /// The point after a time; without rates it has no forces.
     pub fn after(&self, dt: f64) -> Point {
-        let LocalMotion { system, t, x, rates, third_order } = self;
+        let LocalMotion { system, t, x, rates } = self;
         let is_hamiltonian = system.hints().hamiltonian;
         let Some(rates) = rates else {
             return if is_hamiltonian { (*x).clone() } else { Point { q: &x.q + &x.v * dt, ..(*x).clone() } };
         };
         let along = |by: &Components, dt: f64| Point { q: &x.q + &by.x * dt, v: &x.v + &by.y * dt, z: x.z + by.z * dt };
-        if is_hamiltonian || *third_order {
+        if is_hamiltonian {
             // The explicit midpoint rule.
             let middle = rates_along_motion(*system, t + 0.5 * dt, &along(rates, 0.5 * dt));
-            let middle = middle.as_ref().unwrap_or(rates);
-            if is_hamiltonian {
-                return along(middle, dt);
-            }
-            let mean = (&rates.y + &middle.y * 2.0) / 6.0;
-            return Point { q: &x.q + (&x.v + mean * dt) * dt, ..along(middle, dt) };
+            return along(middle.as_ref().unwrap_or(rates), dt);
         }
         Point { q: &x.q + (&x.v + &rates.y * (0.5 * dt)) * dt, ..along(rates, dt) }
     }

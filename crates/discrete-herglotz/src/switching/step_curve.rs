@@ -107,12 +107,19 @@ impl StepCurve {
         self.to.t - self.from.t
     }
 
+    /// The time at a fraction of the step.
+    pub(super) fn time(&self, fraction: f64) -> f64 {
+        if fraction == 1.0 { self.to.t } else { self.from.t + fraction * self.span() }
+    }
+
     /// The time and the point, for switching functions, at a fraction of the step.
     pub(super) fn at(&self, fraction: f64) -> (f64, Point) {
-        let t = self.from.t + fraction * self.span();
-        if fraction == 1.0 {
-            return (self.to.t, if self.is_hamiltonian { phase_point(&self.to.state) } else { self.to.point() });
+        let t = self.time(fraction);
+        if t == self.to.t {
+            return (t, if self.is_hamiltonian { phase_point(&self.to.state) } else { self.to.point() });
         }
+        // The fraction of the rounded time: a surface that moves is where it is at this time, and so must be the point.
+        let fraction = (t - self.from.t) / self.span();
         let x = match self.collocation() {
             Some(dense) if self.is_hamiltonian => phase_point(&dense.at_fraction(fraction)),
             Some(dense) => {
