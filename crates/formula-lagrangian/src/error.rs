@@ -106,7 +106,7 @@ pub enum FormulaError {
     /// The number of coordinates is out of range.
     #[error(
         "the formula has {found} coordinates; it can have from 1 to {MOST_COORDINATES}. Use a lattice or bodies for \
-         systems with more: `lattice` and `bodies` in Python, [lattice] in a scene"
+         systems with more: `lattice` and `bodies` in Python, [system.lattice] in a scene"
     )]
     Dimension {
         /// The number of coordinates.

@@ -10,4 +10,7 @@ mod scene;
 
 #[doc(no_inline)]
 pub use herglotz_runtime as runtime;
-pub use scene::{BodyScene, Combinations, EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, schema};
+pub use scene::{
+    AnyScene, BodyScene, Combinations, EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, VERSION,
+    schema,
+};

@@ -269,7 +269,7 @@ fn checks_have_lyapunov_exponents() {
         assert!(said.contains(part), "{part}: {said}");
     }
     let (code, said) = fail(&["check", &scene("kinks"), "--places", "1", "--lyapunov"]);
-    assert!(code == Some(2) && said.contains("a lattice works only with `herglotz run`"), "{said}");
+    assert!(code == Some(2) && said.contains("it can have from 1 to 256"), "{said}");
 }
 
 /// The defects of the modified Hamiltonians of order k fall as `h^(k+1)`, for a Hamiltonian and for a Lagrangian; a system
@@ -282,7 +282,7 @@ fn checks_have_modified_hamiltonians() {
         ("lagrangian", "lagrangian = \"x'^2/2 - cos(x) - z/5 - z^2/10\""),
     ] {
         let text = format!(
-            "version = 1\n[system]\ncoordinates = [\"x\"]\n{system}\n[start]\nx = 0.4\n\"x'\" = 0.7\n\
+            "version = 2\n[system]\ncoordinates = [\"x\"]\n{system}\n[start]\nx = 0.4\n\"x'\" = 0.7\n\
              [run]\ntime = 4.0\nintegrator = \"gauss_1\"\nstep = 0.05\n"
         );
         let file = at.write(&format!("{name}.toml"), &text);
@@ -440,12 +440,13 @@ fn comparisons_name_the_best() {
 }
 
 const LATTICE: &str = r#"
-[lattice]
+[system]
+parameters = { k = 1.0, gamma = -0.1 }
+[system.lattice]
 sites = [2, 20]
 boundary = "fixed"
 site = "x'^2/2 + gamma*z"
 bond = "-k*(xr - xl)^2/2"
-parameters = { k = 1.0, gamma = -0.1 }
 [start]
 x = "sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)"
 [run]
@@ -468,12 +469,12 @@ fn a_lattice_runs() {
         "{said}"
     );
     let rows = at.read("out/rows.csv");
-    assert!(rows.starts_with("t,x[0][0],x[0][1],"), "{rows}");
+    assert!(rows.starts_with("t,x[0],x[1],"), "{rows}");
     // From the frequencies of the mode along each direction.
     let half = |k: f64| 4.0 * (0.5 * k).sin().powi(2);
     let pi = std::f64::consts::PI;
     let omega = (half(pi / 3.0) + half(pi / 21.0) - 0.0025f64).sqrt();
-    let (t, x) = (column(&rows, "t"), column(&rows, "x[1][6]"));
+    let (t, x) = (column(&rows, "t"), column(&rows, "x[26]"));
     let shape = (2.0 * pi / 3.0).sin() * (7.0 * pi / 21.0).sin();
     assert_eq!(t, [0.0, 1.0, 2.0, 3.0]);
     for (t, x) in t.iter().zip(x) {
@@ -485,41 +486,141 @@ fn a_lattice_runs() {
         assert!(at.read(&format!("out/{figure}")).contains("<svg"), "{figure}");
     }
     assert!(succeed(&["run", &scene, "--out", &out, "--json"]).contains("\"rows\": 4"));
-    for command in ["plan", "check", "compare"] {
-        let (code, said) = fail(&[command, &scene]);
-        assert!(code == Some(2) && said.contains("a lattice works only with `herglotz run`"), "{command}: {said}");
+    // A value that is set is that of the file.
+    succeed(&["run", &scene, "--out", &out, "--set", "k=2"]);
+    let set = at.read("out/rows.csv");
+    let double = at.write("double.toml", &LATTICE.replace("k = 1.0", "k = 2.0"));
+    succeed(&["run", &double, "--out", &out]);
+    assert!(set == at.read("out/rows.csv") && set != rows);
+    let (code, said) = fail(&["run", &scene, "--out", &out, "--resume"]);
+    assert!(code == Some(2) && said.contains("--resume does not apply to a lattice"), "{said}");
+    // Other commands take it as a formula, up to its size.
+    let by_gauss = at.write("gauss.toml", &LATTICE.replace("blanes_moan_6", "gauss_4"));
+    assert!(succeed(&["plan", &by_gauss]).starts_with("60 steps of 0.05 by gauss_4"));
+    let large = at.write("large.toml", &LATTICE.replace("[2, 20]", "[2, 200]"));
+    for command in ["plan", "check", "compare", "sweep", "fit"] {
+        let (code, said) = fail(&[command, &large]);
+        assert!(code == Some(2) && said.contains("it can have from 1 to 256"), "{command}: {said}");
     }
-    let (code, said) = fail(&["run", &scene, "--out", &out, "--set", "k=2"]);
-    assert!(code == Some(2) && said.contains("--set"), "{said}");
+}
+
+/// A lattice of few sites and one of many are the same motion; so is a formula with the same start, by a formula in the index.
+#[test]
+fn lattices_of_few_and_many_coordinates_agree() {
+    let at = Directory::new("lattices");
+    let of = |name: &str, text: &str| {
+        let file = at.write(&format!("{name}.toml"), text);
+        succeed(&["run", &file, "--out", &at.path(name)]);
+        at.read(&format!("{name}/rows.csv"))
+    };
+    let sparse = LATTICE.replace("blanes_moan_6", "gauss_2");
+    let formula = sparse.replace("every = 1.0", "every = 1.0\ncolumns = [\"t\", \"x[0]\", \"x'[26]\", \"energy\"]");
+    let (sparse, formula) = (of("sparse", &sparse), of("formula", &formula));
+    for name in ["x[0]", "x'[26]", "energy"] {
+        for (a, b) in column(&sparse, name).iter().zip(column(&formula, name)) {
+            // Both solve the same equations of a step, to the round-off of sixty steps.
+            assert!((a - b).abs() < 1e-13, "{name}: {a} {b}");
+        }
+    }
+    let two =
+        LATTICE.replace("[system]\n", "[system]\ncoordinates = [\"x\", \"y\"]\n").replace("x'^2/2", "(x'^2 + y'^2)/2");
+    let two =
+        two.replace("-k*(xr - xl)^2/2", "-k*((xr - xl)^2 + (yr - yl)^2)/2").replace("[start]\n", "[start]\ny = 0.5\n");
+    let many = of("two", &two);
+    assert!(many.starts_with("t,x_0,y_0,x_1,"), "{many}");
+    let written = two
+        .replace("every = 1.0", "every = 1.0\ncolumns = [\"t\", \"x_7\", \"y_39\"]")
+        .replace("blanes_moan_6", "gauss_8");
+    let few = of("written", &written);
+    // The same start with single sites.
+    let single = two.replace("y = 0.5\n", "y = 0.5\ny_39 = 0.25\n\"y_0'\" = 0.125\n");
+    let single = of("single", &single);
+    assert_eq!(
+        (column(&single, "y_39")[0], column(&single, "y_38")[0], column(&single, "y_0'")[0]),
+        (0.25, 0.5, 0.125)
+    );
+    for name in ["x_7", "y_39"] {
+        for (a, b) in column(&many, name).iter().zip(column(&few, name)) {
+            // A method of order 6 with steps of a hundredth of the period.
+            assert!((a - b).abs() < 1e-10, "{name}: {a} {b}");
+        }
+    }
+}
+
+/// A scene of version 1 is refused with the command that translates it; what this writes has its comments and its motion.
+#[test]
+fn old_scenes_are_translated() {
+    let at = Directory::new("migrate");
+    let old = "# A chain.\nversion = 1 # old\n\n# Its sites.\n[lattice]\nsites = 20\n# The mass is 1.\nsite = \"x'^2/2 + gamma*z\"\n\
+               bond = \"-(xr - xl)^2/2\"\n[lattice.parameters]\n# The rate.\ngamma = -0.1\n[start]\nx = \"sin(2*pi*i/n)\"\n[run]\n\
+               time = 1.0\nintegrator = \"strang\"\nstep = 0.1\n";
+    let file = at.write("old.toml", old);
+    for command in ["run", "plan"] {
+        let (code, said) = fail(&[command, &file]);
+        let expected = "old.toml, line 5, column 1: `[lattice]` is `[system.lattice]` from version 2 of scene files on; `herglotz migrate`";
+        assert!(code == Some(2) && said.contains(expected), "{said}");
+    }
+    let new = succeed(&["migrate", &file]);
+    for part in [
+        "# A chain.\n",
+        "version = 2 # old\n",
+        "# Its sites.\n[system.lattice]\n",
+        "# The mass is 1.\n",
+        "# The rate.\ngamma = -0.1\n",
+    ] {
+        assert!(new.contains(part), "{part}: {new}");
+    }
+    succeed(&["migrate", &file, "--in-place"]);
+    assert_eq!(at.read("old.toml"), new);
+    // x'' = -(2 sin(pi/20))^2 x - 0.1 x', to the order of the steps.
+    succeed(&["run", &file, "--out", &at.path("out")]);
+    let end = *column(&at.read("out/rows.csv"), "x[5]").last().unwrap();
+    let omega = (4.0 * (std::f64::consts::PI / 20.0).sin().powi(2) - 0.0025f64).sqrt();
+    let exact = (-0.05f64).exp() * (omega.cos() + 0.05 / omega * omega.sin());
+    assert!((end - exact).abs() < 1e-4, "{end} for {exact}");
+    // The new one is left as it is, also one without a version.
+    assert_eq!(succeed(&["migrate", &file]), new);
+    let body = "[body]\ninertia = [1.0, 2.0, 3.0]\n[start]\nomega = [1.0, 0.0, 0.0]\n";
+    assert_eq!(succeed(&["migrate", &at.write("body.toml", body)]), body.replace("[body]", "[system.body]"));
+    let (code, said) = fail(&["migrate", &at.write("bad.toml", "version = \n")]);
+    assert!(code == Some(2) && said.contains("bad.toml, line 1"), "{said}");
 }
 
 /// Errors of a lattice scene are reported with their position.
 #[test]
 fn wrong_lattices_are_refused() {
+    let formula = "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"";
     let changes = [
-        ("gamma*z", "gama*z", "line 5, column 18: unknown name `gama`; did you mean `gamma`?"),
-        ("-k*(xr - xl)^2/2", "-k*(xr - x)^2/2", "line 6, column 18: unknown name `x`"),
-        ("-k*(xr - xl)^2/2", "-k*(xr' - xl')^2/2", "line 6, column 8: `bond` depends on velocities"),
-        ("k = 1.0", "k = 1.0, c = 2.0", "line 7, column 16: `parameters` has `c`"),
-        ("[2, 20]", "[0, 20]", "line 3, column 9: `sites` has 0 along a direction"),
-        ("[2, 20]", "[2000000, 20000]", "line 3, column 9: the lattice has more than 1000000 sites"),
-        ("\"fixed\"", "\"open\"", "line 4, column 12: unknown word `open`"),
-        ("x = \"sin", "y = \"sin", "line 9, column 1: unknown name `y` in the start"),
-        ("(j + 1)/21", "(k + l)/21", "line 9, column"),
+        ("gamma*z", "gama*z", "line 7, column 18: unknown name `gama`; did you mean `gamma`?"),
+        ("-k*(xr - xl)^2/2", "-k*(xr - x)^2/2", "line 8, column 18: unknown name `x`"),
+        ("-k*(xr - xl)^2/2", "-k*(xr' - xl')^2/2", "line 8, column 8: `bond` depends on velocities"),
+        ("k = 1.0", "k = 1.0, c = 2.0", "line 3, column 16: `parameters` has `c`"),
+        ("[2, 20]", "[0, 20]", "line 5, column 9: `sites` has 0 along a direction"),
+        ("[2, 20]", "[2000000, 20000]", "line 5, column 9: the lattice has more than 1000000 sites"),
+        ("\"fixed\"", "\"open\"", "line 6, column 12: unknown word `open`"),
         (
-            "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"",
+            "x = \"sin",
+            "y = \"sin",
+            "line 10, column 1: unknown name `y` in the start; the known names are x, x', p_x, z, t",
+        ),
+        ("x = \"sin", "\"x'\" = \"sin", "line 9, column 1: the coordinate `x` has no value at the start"),
+        ("(j + 1)/21", "(k + l)/21", "line 10, column"),
+        (
+            formula,
             "x = [1.0, 2.0]",
-            "line 9, column 5: `x` is a list of 2 numbers, but there are 40 sites",
+            "line 10, column 5: `x` is a list of length 2; it must be a list of 40 numbers, one number for all, or a formula in `i`",
         ),
+        (formula, "x = \"1/(i - 1)\"", "line 10, column 5: `x` is inf at the entry 20"),
+        (formula, "x = 0.0\nz = \"1\"", "line 11, column 5: `z` is a text; it must be a number"),
+        ("\"blanes_moan_6\"", "\"gauss_8\"", "line 13, column 14: `integrator` is \"gauss_8\""),
+        ("step = 0.05", "", "line 11, column 1: the run of a large lattice needs"),
+        ("time = 3.0", "", "line 11, column 1: the run has no `time`; add it"),
         (
-            "x = \"sin(pi*(i + 1)/3)*sin(pi*(j + 1)/21)\"",
-            "x = \"1/(i - 1)\"",
-            "line 9, column 5: `x` is inf at site 20",
+            "step = 0.05",
+            "accuracy = 1e-9",
+            "line 14, column 12: `accuracy` takes a formula, which has at most 256 coordinates",
         ),
-        ("\"blanes_moan_6\"", "\"gauss_8\"", "line 12, column 14: `integrator` is \"gauss_8\""),
-        ("step = 0.05", "", "line 10, column 1: the run of a lattice needs"),
-        ("step = 0.05", "accuracy = 1e-9", "line 13, column 12: a lattice is integrated with given steps"),
-        ("every = 1.0", "columns = [\"t\"]", "line 15, column 11: the rows of a lattice contain the whole state"),
+        ("every = 1.0", "columns = [\"t\"]", "line 16, column 11: `columns` takes a formula"),
     ];
     refuses_each(LATTICE, &changes, |text| match herglotz::LatticeScene::read(text) {
         Err(error) => Some(error.to_string()),

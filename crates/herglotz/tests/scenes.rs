@@ -35,7 +35,7 @@ gamma = { from = -1.0, to = 0.0, count = 101 }
 "#;
 
 const SEVERAL: &str = r#"
-version = 1
+version = 2
 [system]
 coordinates = ["u[2]", "x"]
 lagrangian = '''
@@ -122,7 +122,7 @@ const BAD: [(&str, &str); 57] = [
     ("count = 101", "count = 0"),
     ("count = 101", "count = 10000000000"),
     ("count = 101", "count = 101, spacing = \"log\""),
-    ("[system]", "version = 2\nnew = \"thing\"\n[system]"),
+    ("[system]", "version = 3\nnew = \"thing\"\n[system]"),
     // Integrators that do not apply to the system.
     ("accuracy = 1e-10", "integrator = \"transformed_gauss_8\"\nstep = 0.1"),
 ];

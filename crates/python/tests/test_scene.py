@@ -48,6 +48,49 @@ def test_every_scene_of_the_repository_runs(scene):
     assert sol.found if isinstance(sol, hz.Path) else sol.success
 
 
+LATTICE = """
+[system]
+parameters = { k = 2.0, gamma = -0.1 }
+[system.lattice]
+sites = [2, 10]
+boundary = "fixed"
+site = "x'^2/2 + cos(x) + gamma*z"
+bond = "-k*(xr - xl)^2/2"
+[start]
+x = "sin(i + j/n) + k"
+"x[3]" = 0.5
+[run]
+time = 1.0
+integrator = "strang"
+step = 0.1
+"""
+
+
+def test_lattices_run_by_sparse_integrators_or_as_formulas(tmp_path):
+    i, j = np.indices((2, 10))
+    q0 = (np.sin(i + j / 20) + 2).ravel()
+    q0[3] = 0.5
+    L = hz.lattice("x'^2/2 + cos(x) + gamma*z", "-k*(xr - xl)^2/2", sites=(2, 10), boundary="fixed", parameters={"k": 2.0, "gamma": -0.1})
+    sparse = hz.run(written(tmp_path, LATTICE))
+    assert isinstance(sparse, hz.SparseSolution) and (sparse.q[-1] == hz.solve(L, q0, np.zeros(20), 1.0, integrator="strang", step=0.1).q[-1]).all()
+    for change in [("strang", "gauss_4"), ('integrator = "strang"\nstep = 0.1', "accuracy = 1e-8")]:
+        sol = hz.run(written(tmp_path, LATTICE.replace(*change)))
+        # A method of order 2 with ten steps against more accurate ones.
+        assert isinstance(sol, hz.Solution) and abs(sol.q[-1] - sparse.q[-1]).max() < 0.02
+    with pytest.raises(ValueError, match=r"unknown name `x\[20\]` in \[start\]"):
+        hz.run(written(tmp_path, LATTICE.replace("x[3]", "x[20]")))
+    with pytest.raises(ValueError, match=r"\[start\] has no `x` at some sites"):
+        hz.run(written(tmp_path, LATTICE.replace('x = "sin(i + j/n) + k"\n', "")))
+
+
+def test_bodies_refuse_what_does_not_apply(tmp_path):
+    body = (SCENES / "heavy_top.toml").read_text()
+    assert hz.run(written(tmp_path, body), {"mass": 14.0}).success
+    for table, key in [("[run]", "exact = true"), ("[want]", "estimate = true"), ("[start]", "[force]\nx = '1'\n[start]")]:
+        with pytest.raises(ValueError, match="does not apply to a rigid body"):
+            hz.run(written(tmp_path, body.replace(table, key if "[" in key else f"{table}\n{key}")))
+
+
 def test_values_of_the_literature():
     body = hz.run(SCENES / "free_body.toml")
     assert abs(body.Pi[-1] - [0.328817081371932892, -0.494159614067396359, -0.231714161269102468]).max() < 1e-12
@@ -67,6 +110,11 @@ def test_values_of_the_literature():
         (("every =", "each ="), "unknown name `each` in `rows`"),
         (("[system]", "[system"), "scene.toml"),
         (("lagrangian =", "H ="), r"unknown name `H` in \[system\]"),
+        (("time = 10.0\n", ""), r"\[run\] has no `time`"),
+        (("[system]", "version = 3\n[system]"), "the scene has version 3"),
+        (("[system]", "lattice = { sites = 3 }\n[system]"), r"\[lattice\] is \[system.lattice\] from version 2 .* `herglotz migrate`"),
+        (("[system]", "body = { inertia = [1, 2, 3] }\n[system]"), r"\[body\] is \[system.body\]"),
+        (("[run]", "[ends]\ntheta = 1.0\nt = 2.0\n[run]"), "`time` does not apply to a path between two ends"),
     ],
 )
 def test_what_is_wrong_with_a_scene_is_said(tmp_path, change, message):

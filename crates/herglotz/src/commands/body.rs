@@ -35,9 +35,8 @@ fn whole_rows(scene: &BodyScene, directory: &Directory) -> Result<Vec<Vec<f64>>,
 }
 
 impl Run {
-    /// Runs a scene with `[body]`.
-    pub(super) fn run_body(&self, text: &str) -> Result<(), Failure> {
-        let scene = self.scene.read_body(text)?;
+    /// Runs a scene of a rigid body.
+    pub(super) fn run_body(&self, scene: &BodyScene) -> Result<(), Failure> {
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
         let directory = Directory::new(self.out.clone(), &self.scene.file);
         let saved = if self.resume { Some(Checkpoint::read(&directory, &scene.fingerprint())?) } else { None };
@@ -53,8 +52,8 @@ impl Run {
         let from = saved.as_ref().map(|saved| saved.state(&directory, BodyResumeState::from_bytes)).transpose()?;
         let name = |k: &usize| Body::COLUMNS.get(*k).map(|name| (*name).to_owned());
         let headers =
-            Headers { rows: scene.columns.iter().filter_map(name).collect(), events: header_of_events(&scene) };
-        let row_of_event = |crossing: &Crossing| row_of_event(&scene, crossing);
+            Headers { rows: scene.columns.iter().filter_map(name).collect(), events: header_of_events(scene) };
+        let row_of_event = |crossing: &Crossing| row_of_event(scene, crossing);
         let mut writer = RunWriter::new(&directory, &headers, saved.as_ref(), !self.json)?;
         writer.columns = Some(&scene.columns);
         writer.row_of_event = &row_of_event;
@@ -62,7 +61,7 @@ impl Run {
         // The file ends where the motion is resumed.
         writer.kept = match &saved {
             _ if !self.plot => None,
-            Some(_) => Some(whole_rows(&scene, &directory)?),
+            Some(_) => Some(whole_rows(scene, &directory)?),
             None => Some(Vec::new()),
         };
         let every = Duration::from_secs(self.checkpoint_every.into());
@@ -85,7 +84,7 @@ impl Run {
         for (name, figure) in written.kept.iter().flat_map(|rows| plot_body::of_body(&scene.body, rows)) {
             files.push(directory.write(name, &figure)?);
         }
-        self.tell_body(&scene, &plan, &outcome, (&written, &files))
+        self.tell_body(scene, &plan, &outcome, (&written, &files))
     }
 
     /// Prints the final state.

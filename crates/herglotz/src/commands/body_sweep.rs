@@ -45,16 +45,15 @@ fn row_of(scene: &BodyScene, columns: &[usize], member: BodyMember) -> MemberRow
 }
 
 impl Sweep {
-    /// Runs the sweep of a scene with `[body]`.
-    pub(super) fn sweep_body(&self, text: &str) -> Result<(), Failure> {
-        let scene = self.scene.read_body(text)?;
+    /// Runs the sweep of a scene of a rigid body.
+    pub(super) fn sweep_body(&self, scene: &BodyScene) -> Result<(), Failure> {
         let members = scene.combinations();
         self.require_values(members)?;
         // The time is a column of its own.
         let columns: Vec<usize> = scene.columns.iter().copied().filter(|k| *k != 0).collect();
         let names: Vec<&str> = columns.iter().filter_map(|k| Body::COLUMNS.get(*k).copied()).collect();
         let directory = Directory::new(self.out.clone(), &self.scene.file);
-        let of_events = header_of_events(&scene);
+        let of_events = header_of_events(scene);
         let mut writer = SweepWriter::new(&directory, members, &names, of_events.as_deref(), (self.plot, !self.json))?;
         let stop = writer.stop.clone();
         let ensemble = BodyEnsemble {
@@ -63,7 +62,7 @@ impl Sweep {
             threads: self.threads.map(usize::from),
             interrupt: Some(Interrupt::when(move || stop.load(Ordering::Relaxed))),
         };
-        let tally = ensemble.run(&mut |member| writer.member(row_of(&scene, &columns, member)));
+        let tally = ensemble.run(&mut |member| writer.member(row_of(scene, &columns, member)));
         writer.end_progress();
         let tally = tally.map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let drawn = DrawnColumns { at_end: &names, at_first_event: &Body::COLUMNS, is_angle: &|_| false };

@@ -1,7 +1,7 @@
 //! `herglotz check`.
 
 use super::plan::momentum;
-use super::scene_arguments::SceneArguments;
+use super::scene_arguments::{FormulaOrBody, SceneArguments};
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
 use clap::Args;
@@ -31,11 +31,10 @@ pub(crate) struct Check {
 
 impl Check {
     pub fn run(&self) -> Result<(), Failure> {
-        let text = self.scene.text()?;
-        if BodyScene::is_one(&text) {
-            return self.check_body(&text);
-        }
-        let scene = self.scene.read()?;
+        let scene = match self.scene.read_formula_or_body()? {
+            FormulaOrBody::Formula(scene) => scene,
+            FormulaOrBody::Body(scene) => return self.check_body(&scene),
+        };
         let checked = scene.system.check(&scene.bare_motion(), self.samples.into());
         let check = checked.map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let lyapunov =
@@ -44,10 +43,8 @@ impl Check {
         let modified =
             self.modified.then(|| scene.system.modified_defects(&scene.bare_motion(), super::modified::MOST));
         let modified = modified.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let field = match scene.system.hamiltonian_structure() {
-            Some(_) => Some(scene.system.hamiltonian_geometry(&scene.bare_motion().start)),
-            None => None,
-        };
+        let is_hamiltonian = scene.system.hamiltonian_structure().is_some();
+        let field = is_hamiltonian.then(|| scene.system.hamiltonian_geometry(&scene.bare_motion().start));
         let field = field.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let momenta: Vec<String> =
             scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
@@ -76,13 +73,12 @@ impl Check {
         verdict(&check)
     }
 
-    /// Checks a scene with `[body]`.
-    fn check_body(&self, text: &str) -> Result<(), Failure> {
+    /// Checks a scene of a rigid body.
+    fn check_body(&self, scene: &BodyScene) -> Result<(), Failure> {
         if self.lyapunov || self.modified {
-            let why = "--lyapunov and --modified do not apply to a scene with [body]; check it without them";
+            let why = "--lyapunov and --modified do not apply to a rigid body; check it without them";
             return Err(Failure::Input(why.into()));
         }
-        let scene = self.scene.read_body(text)?;
         let explain = |error| self.scene.explain(scene.explain(&error));
         let motion = BodyMotion { rows: None, events: Vec::new(), ..scene.motion.clone() };
         let check = scene.body.check(&motion, self.samples.into()).map_err(explain)?;

@@ -9,14 +9,9 @@ use herglotz::EndsScene;
 use herglotz::runtime::FoundPath;
 
 impl Run {
-    /// Runs a scene with `[ends]`.
-    pub(super) fn run_ends(&self, text: &str) -> Result<(), Failure> {
-        if self.resume || !self.scene.changes.is_empty() {
-            return Err(Failure::Input(
-                "--resume and --set do not apply to a scene with [ends]; run it without them".into(),
-            ));
-        }
-        let scene = EndsScene::read(text).map_err(|error| self.scene.explain(error))?;
+    /// Finds the path of a scene with `[ends]`.
+    pub(super) fn run_path(&self, scene: &EndsScene) -> Result<(), Failure> {
+        self.refuse_resume("a path between two ends")?;
         let searched = scene.system.path(&scene.problem);
         let found = searched.map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let rows = rows(scene.system.dimension(), &found);
@@ -28,11 +23,11 @@ impl Run {
         let mut files = Written::default();
         files.push(directory.file(ROWS));
         if self.plot {
-            for (name, figure) in plot::of_path(&scene, &rows) {
+            for (name, figure) in plot::of_path(scene, &rows) {
                 files.push(directory.write(&name, &figure)?);
             }
         }
-        self.tell_path(&scene, &found, &files)
+        self.tell_path(scene, &found, &files)
     }
 
     /// Prints how the search ended, and the quality of the path.

@@ -9,14 +9,9 @@ use herglotz::LatticeScene;
 use herglotz::runtime::{Outcome, Status};
 
 impl Run {
-    /// Runs a scene with `[lattice]`.
-    pub(super) fn run_lattice(&self, text: &str) -> Result<(), Failure> {
-        if self.resume || !self.scene.changes.is_empty() {
-            return Err(Failure::Input(
-                "--resume and --set do not apply to a scene with [lattice]; run it without them".into(),
-            ));
-        }
-        let scene = LatticeScene::read(text).map_err(|error| self.scene.explain(error))?;
+    /// Runs a scene of a lattice by sparse integrators.
+    pub(super) fn run_lattice(&self, scene: &LatticeScene) -> Result<(), Failure> {
+        self.refuse_resume("a lattice of many sites")?;
         let directory = Directory::new(self.out.clone(), &self.scene.file);
         let headers = Headers { rows: scene.columns(), events: None };
         let mut writer = RunWriter::new(&directory, &headers, None, !self.json)?;
@@ -27,10 +22,10 @@ impl Run {
         let written = writer.finish(&directory, outcome.steps)?;
         let mut files = Written::default();
         files.push(directory.file(ROWS));
-        for (name, figure) in written.kept.iter().flat_map(|rows| plot::of_lattice(&scene, rows)) {
+        for (name, figure) in written.kept.iter().flat_map(|rows| plot::of_lattice(scene, rows)) {
             files.push(directory.write(&name, &figure)?);
         }
-        self.tell_lattice(&scene, &outcome, (written.rows, &files))
+        self.tell_lattice(scene, &outcome, (written.rows, &files))
     }
 
     /// Prints the final state.
@@ -64,8 +59,8 @@ impl Run {
         } else {
             let sites: usize = scene.sizes.iter().product();
             print(&format!(
-                "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the final state:\n  t = {}\n \
-                  z = {}\n{}",
+                "{status}: {steps} steps of {sites} sites by {integrator}\n{rows} rows; the final state:\n  t = {}\n  \
+                 z = {}\n{}",
                 short(*t),
                 short(z),
                 files.line()

@@ -11,6 +11,7 @@ mod fit;
 mod lattice;
 mod list;
 mod lyapunov;
+mod migrate;
 mod modified;
 mod new;
 mod plan;
@@ -66,6 +67,8 @@ pub(crate) enum Command {
     List(list::List),
     /// Print a commented scene as a starting point.
     New(new::New),
+    /// Translate scene files of an older version of the format, with their comments.
+    Migrate(migrate::Migrate),
     /// Print the completions for a shell.
     Completions {
         /// The shell.
@@ -87,6 +90,7 @@ impl Command {
             Command::Fit(command) => command.run(),
             Command::List(command) => command.run(),
             Command::New(command) => command.run(),
+            Command::Migrate(command) => command.run(),
             Command::Completions { shell } => print(&completions::text(shell, &Program::command())),
             Command::Schema => print_json(&herglotz::schema()),
         }

@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::output::print;
 use clap::Args;
+use herglotz::VERSION;
 use herglotz::runtime::{CatalogueEntry, velocity_name};
 
 #[derive(Args)]
@@ -59,7 +60,7 @@ fn template(entry: &CatalogueEntry) -> Result<String, Failure> {
     let t = if entry.t == 0.0 { String::new() } else { format!("t = {}\n", number(entry.t)) };
     Ok(format!(
         r#"# {about}. Run it by `herglotz run FILE`; `herglotz plan FILE` prints what will be computed.
-version = 1
+version = {VERSION}
 
 [system]
 coordinates = [{blocks}]

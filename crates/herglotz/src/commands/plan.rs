@@ -1,6 +1,6 @@
 //! `herglotz plan`.
 
-use super::scene_arguments::SceneArguments;
+use super::scene_arguments::{FormulaOrBody, SceneArguments};
 use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;
@@ -85,11 +85,10 @@ struct Facts {
 
 impl Plan {
     pub fn run(&self) -> Result<(), Failure> {
-        let text = self.scene.text()?;
-        if BodyScene::is_one(&text) {
-            return self.plan_body(&text);
-        }
-        let scene = self.scene.read()?;
+        let scene = match self.scene.read_formula_or_body()? {
+            FormulaOrBody::Formula(scene) => scene,
+            FormulaOrBody::Body(scene) => return self.plan_body(&scene),
+        };
         let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let facts = Facts {
             source: "the formula",
@@ -100,9 +99,8 @@ impl Plan {
         self.print(&plan, &facts)
     }
 
-    /// The plan of a scene with `[body]`.
-    fn plan_body(&self, text: &str) -> Result<(), Failure> {
-        let scene = self.scene.read_body(text)?;
+    /// The plan of a scene of a rigid body.
+    fn plan_body(&self, scene: &BodyScene) -> Result<(), Failure> {
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
         let plan = scene.body.plan(&scene.motion).map_err(explain)?;
         let facts = Facts {

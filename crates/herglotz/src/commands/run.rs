@@ -10,7 +10,7 @@ use clap::Args;
 use herglotz::runtime::{
     AnyIntegrator, Crossing, Outcome, Plan, ResumeState, RuntimeError, Status, StepControl, Steps, velocity_name,
 };
-use herglotz::{BodyScene, EndsScene, LatticeScene, Scene};
+use herglotz::{AnyScene, Scene};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -52,17 +52,12 @@ pub(crate) fn header_of_events(scene: &Scene) -> Vec<String> {
 
 impl Run {
     pub fn run(&self) -> Result<(), Failure> {
-        let text = self.scene.text()?;
-        if LatticeScene::is_one(&text) {
-            return self.run_lattice(&text);
-        }
-        if BodyScene::is_one(&text) {
-            return self.run_body(&text);
-        }
-        if EndsScene::is_one(&text) {
-            return self.run_ends(&text);
-        }
-        let scene = self.scene.read()?;
+        let scene = match self.scene.read_any()? {
+            AnyScene::Motion(scene) => scene,
+            AnyScene::Lattice(scene) => return self.run_lattice(&scene),
+            AnyScene::Body(scene) => return self.run_body(&scene),
+            AnyScene::Path(scene) => return self.run_path(&scene),
+        };
         let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
         let mut motion = scene.motion();
         motion.resumable = true;
@@ -126,6 +121,14 @@ impl Run {
             }
         }
         self.report(&scene, &plan, &outcome, (written.rows, written.events, &files), written.is_resumable)
+    }
+
+    /// Refuses to resume what has no checkpoints.
+    pub(super) fn refuse_resume(&self, what: &str) -> Result<(), Failure> {
+        match self.resume {
+            true => Err(Failure::Input(format!("--resume does not apply to {what}; run it without it"))),
+            false => Ok(()),
+        }
     }
 
     /// Prints the final state.

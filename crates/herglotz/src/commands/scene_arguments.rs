@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use clap::{Args, ValueHint};
-use herglotz::{BodyScene, Scene, SceneError};
+use herglotz::{AnyScene, BodyScene, Scene, SceneError};
 use std::path::{Path, PathBuf};
 
 /// A scene file, with overrides.
@@ -17,6 +17,14 @@ pub(crate) struct SceneArguments {
     pub(crate) changes: Vec<String>,
 }
 
+/// A scene of one of the kinds that have plans, checks and sweeps.
+pub(crate) enum FormulaOrBody {
+    /// A system with a formula.
+    Formula(Box<Scene>),
+    /// A rigid body.
+    Body(Box<BodyScene>),
+}
+
 impl SceneArguments {
     /// Reads the scene.
     pub fn read(&self) -> Result<Scene, Failure> {
@@ -24,9 +32,22 @@ impl SceneArguments {
         Scene::read_in(&self.text()?, &self.changes, folder).map_err(|error| self.explain(error))
     }
 
-    /// Reads the scene of a rigid body from its text.
-    pub fn read_body(&self, text: &str) -> Result<BodyScene, Failure> {
-        BodyScene::read_with(text, &self.changes).map_err(|error| self.explain(error))
+    /// Reads the scene, of whatever kind.
+    pub fn read_any(&self) -> Result<AnyScene, Failure> {
+        let folder = self.file.parent().unwrap_or(Path::new(""));
+        AnyScene::read_in(&self.text()?, &self.changes, folder).map_err(|error| self.explain(error))
+    }
+
+    /// Reads the scene of a system with a formula, or of a rigid body.
+    pub fn read_formula_or_body(&self) -> Result<FormulaOrBody, Failure> {
+        match self.read_any()? {
+            AnyScene::Body(body) => Ok(FormulaOrBody::Body(body)),
+            AnyScene::Motion(scene) => Ok(FormulaOrBody::Formula(scene)),
+            // A lattice may be a formula as well; others are refused.
+            AnyScene::Lattice(_) | AnyScene::Path(_) => {
+                self.read().map(|scene| FormulaOrBody::Formula(Box::new(scene)))
+            }
+        }
     }
 
     /// The text of the file.

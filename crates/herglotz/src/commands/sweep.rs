@@ -1,14 +1,14 @@
 //! `herglotz sweep`.
 
 use super::run::{header_of_events, numbers_of_event};
-use super::scene_arguments::SceneArguments;
+use super::scene_arguments::{FormulaOrBody, SceneArguments};
 use super::sweep_writer::{Drawn, MemberEndRow, MemberRow, SweepOutput, SweepWriter};
 use crate::failure::Failure;
 use crate::output::{Directory, print, print_json};
 use crate::plot;
 use clap::Args;
 use herglotz::runtime::{Column, Crossing, Ending, Ensemble, Event, MemberEnd, Status, Tally, Varied};
-use herglotz::{BodyScene, Combinations, Scene};
+use herglotz::{Combinations, Scene};
 use std::path::PathBuf;
 
 #[derive(Args)]
@@ -75,11 +75,10 @@ pub(super) struct DrawnColumns<'n> {
 
 impl Sweep {
     pub fn run(&self) -> Result<(), Failure> {
-        let text = self.scene.text()?;
-        if BodyScene::is_one(&text) {
-            return self.sweep_body(&text);
-        }
-        let scene = self.scene.read()?;
+        let scene = match self.scene.read_formula_or_body()? {
+            FormulaOrBody::Formula(scene) => scene,
+            FormulaOrBody::Body(scene) => return self.sweep_body(&scene),
+        };
         let members = scene.members();
         self.require_values(members.combinations())?;
         let refuse = |why: &str| Failure::Input(format!("{}: {why}", self.scene.file.display()));

@@ -1,12 +1,12 @@
 //! Scenes of a rigid body.
 
 use super::SceneError;
-use super::body_file::{BodyEventTable, BodyFile, InertiaTable};
-use super::body_overrides;
-use super::checked::{check_version, finite};
+use super::body_table::{BodyTable, InertiaTable};
+use super::checked::finite;
 use super::combinations::Combinations;
-use super::file::{DirectionName, RowsTable, span_of_table};
-use super::location::{Location, Span};
+use super::file::{self, DirectionName, EventTable, File, RowsTable};
+use super::location::{Location, Named, Numbers, Span};
+use super::only::{refuse_all, set};
 use super::output::{RowTimes, of_formula};
 use super::step_control::step_control;
 use super::sweep::{self, Slot, SweptQuantity};
@@ -31,16 +31,11 @@ pub struct BodyScene {
 }
 
 impl BodyScene {
-    /// Whether a text is a scene with `[body]`.
-    pub fn is_one(text: &str) -> bool {
-        span_of_table(text, "body").is_some()
-    }
-
-    /// Reads a scene file with `[body]`.
+    /// Reads a scene file of a rigid body.
     ///
     /// ```
     /// let scene = herglotz::BodyScene::read(r#"
-    ///     [body]
+    ///     [system.body]
     ///     inertia = [1.0, 2.0, 3.0]
     ///     gamma = -0.1
     ///     [start]
@@ -56,35 +51,18 @@ impl BodyScene {
     /// # Errors
     /// [`SceneError`] with the position in the text.
     pub fn read(text: &str) -> Result<Self, SceneError> {
-        Self::read_with(text, &[])
+        Self::of(text, &file::read(text, &[])?)
     }
 
-    /// Reads a scene file with `[body]` and overrides some of its values: numbers such as `gamma=-0.2`, `mass=2`,
-    /// `inertia1=0.5` and `start.omega3=10`, vectors such as `start.omega=[0.0, 0.0, 10.0]`, and those of the run as in
-    /// [`Scene::read_with`](super::Scene::read_with).
-    ///
-    /// # Errors
-    /// [`SceneError`] with the position in the text, or in the override.
-    pub fn read_with(text: &str, changes: &[String]) -> Result<Self, SceneError> {
-        check_version(text)?;
-        let mut file: BodyFile = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
-        changes.iter().try_for_each(|change| body_overrides::apply(&mut file, change))?;
-        let BodyFile { body: table, start, run, want, .. } = &file;
-        let number = |x: &Option<Location<f64>>, name: &str| match x {
-            Some(x) => finite(text, x, name),
-            None => Ok(0.0),
+    /// Reads the tables of a scene.
+    pub(super) fn of(text: &str, file: &File) -> Result<Self, SceneError> {
+        let (run, want) = (&file.run, &file.want);
+        let Some(table) = &file.system.body else {
+            return Err(SceneError::at(text, file.system.span(), "the system has no `body`"));
         };
-        let mut body = Body {
-            inertia: match *table.inertia {
-                InertiaTable::Principal(moments) => Body::principal(moments),
-                InertiaTable::Matrix(rows) => rows,
-            },
-            mass: number(&table.mass, "mass")?,
-            centre: table.centre.as_ref().map_or([0.0; 3], |x| **x),
-            gravity: table.gravity.as_ref().map_or([0.0; 3], |x| **x),
-            gamma: number(&table.gamma, "gamma")?,
-            torque: None,
-        };
+        refuse_all(text, not_of_bodies(file), |name| format!("`{name}` does not apply to a rigid body; remove it"))?;
+        let start = BodyStart::read(text, file)?;
+        let mut body = of_table(text, table)?;
         let of = |x: Option<Span>, otherwise: Span| x.unwrap_or(otherwise);
         let step = run.step.as_ref().map(Location::span).or(run.steps.as_ref().map(Location::span));
         let spans = [
@@ -92,7 +70,7 @@ impl BodyScene {
             ("mass", of(table.mass.as_ref().map(Location::span), table.span())),
             ("centre", of(table.centre.as_ref().map(Location::span), table.span())),
             ("gravity", of(table.gravity.as_ref().map(Location::span), table.span())),
-            ("attitude", of(start.attitude.as_ref().map(Location::span), start.span())),
+            ("attitude", start.attitude.span()),
             ("omega", start.omega.span()),
             ("step", of(step, run.span())),
             ("accuracy", of(run.accuracy.as_ref().map(Location::span), run.span())),
@@ -118,20 +96,14 @@ impl BodyScene {
                            remove `breaks`";
             return Err(SceneError::at(text, breaks.span(), message));
         }
-        let end = finite(text, &run.time, "time")?;
-        let t = number(&start.t, "t")?;
+        let (end, t) = (run.end(text, run.span())?, start.t);
         let row_times = RowTimes::read(text, want.rows.as_ref(), (t, end))?;
         let motion = BodyMotion {
             t,
-            z: number(&start.z, "z")?,
+            z: start.z,
             rows: Some(row_times.when(t, end)),
             events: want.events.iter().map(|event| read_event(text, event)).collect::<Result<_, _>>()?,
-            ..BodyMotion::new(
-                start.attitude.as_ref().map_or([1.0, 0.0, 0.0, 0.0], |x| **x),
-                *start.omega,
-                end,
-                step_control(text, run)?,
-            )
+            ..BodyMotion::new(*start.attitude, *start.omega, end, step_control(text, run)?)
         };
         let columns = columns(text, want.rows.as_ref())?;
         let events = want.events.iter().map(|event| (*event.when).clone()).collect();
@@ -183,6 +155,125 @@ impl BodyScene {
     }
 }
 
+/// The body of a table, without its torque.
+fn of_table(text: &str, table: &BodyTable) -> Result<Body, SceneError> {
+    let number = |x: &Option<Location<f64>>, name: &str| match x {
+        Some(x) => finite(text, x, name),
+        None => Ok(0.0),
+    };
+    Ok(Body {
+        inertia: match *table.inertia {
+            InertiaTable::Principal(moments) => Body::principal(moments),
+            InertiaTable::Matrix(rows) => rows,
+        },
+        mass: number(&table.mass, "mass")?,
+        centre: table.centre.as_ref().map_or([0.0; 3], |x| **x),
+        gravity: table.gravity.as_ref().map_or([0.0; 3], |x| **x),
+        gamma: number(&table.gamma, "gamma")?,
+        torque: None,
+    })
+}
+
+/// The keys that rigid bodies do not have, with their positions.
+fn not_of_bodies(file: &File) -> Vec<(Option<Span>, &'static str)> {
+    fn span<T>(key: &Option<Location<T>>) -> Option<Span> {
+        key.as_ref().map(Location::span)
+    }
+    let (system, want) = (&*file.system, &file.want);
+    let mut keys = vec![
+        (span(&system.catalogue), "catalogue"),
+        (span(&system.coordinates), "coordinates"),
+        (span(&system.lagrangian), "lagrangian"),
+        (span(&system.hamiltonian), "hamiltonian"),
+        (span(&system.momenta), "momenta"),
+        (span(&system.action), "action"),
+        (span(&system.constraints), "constraints"),
+        (span(&system.lattice), "lattice"),
+        (span(&system.bodies), "bodies"),
+        (system.parameters.0.first().map(|(name, _)| name.span()), "parameters"),
+        (span(&file.ends), "ends"),
+        (span(&file.force), "force"),
+        (file.friction.0.first().map(|(name, _)| name.span()), "friction"),
+        (file.tables.0.first().map(|(name, _)| name.span()), "tables"),
+        (file.fit.as_ref().map(|fit| fit.span()), "fit"),
+        (set(&file.run.project), "project"),
+        (set(&file.run.exact), "exact"),
+        (want.wrap.first().map(Location::span), "wrap"),
+        (set(&want.conformal_factor), "conformal_factor"),
+        (set(&want.estimate), "estimate"),
+    ];
+    for event in &want.events {
+        keys.extend([
+            (span(&event.from), "from"),
+            (event.columns.first().map(Location::span), "columns"),
+            (span(&event.then), "then"),
+            (span(&event.impact), "impact"),
+            (span(&event.rest), "rest"),
+        ]);
+    }
+    keys
+}
+
+/// The initial state of a rigid body.
+struct BodyStart {
+    attitude: Location<[f64; 4]>,
+    omega: Location<[f64; 3]>,
+    t: f64,
+    z: f64,
+}
+
+impl BodyStart {
+    fn read(text: &str, file: &File) -> Result<Self, SceneError> {
+        let none = Location::new(Named::default(), file.system.span());
+        let table = file.start.as_ref().unwrap_or(&none);
+        const NAMES: [&str; 4] = ["attitude", "omega", "t", "z"];
+        if let Some((name, _)) = table.0.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
+            let message = format!(
+                "unknown name `{}` in the start of a rigid body; the known names are {}",
+                **name,
+                NAMES.join(", ")
+            );
+            return Err(SceneError::unknown(text, name.span(), name, NAMES, message));
+        }
+        let number = |name: &str| match table.get(name) {
+            None => Ok(0.0),
+            Some(given) => match &**given {
+                Numbers::One(x) => finite(text, &Location::new(*x, given.span()), name),
+                _ => Err(SceneError::at(text, given.span(), format!("`{name}` must be a number"))),
+            },
+        };
+        let Some(omega) = vector(text, table, "omega")? else {
+            let message =
+                "the start has no `omega`, the angular velocity in the body; add it, as in omega = [0.0, 0.0, 1.0]";
+            return Err(SceneError::at(text, table.span(), message));
+        };
+        let attitude = vector(text, table, "attitude")?;
+        Ok(BodyStart {
+            attitude: attitude.unwrap_or(Location::new([1.0, 0.0, 0.0, 0.0], table.span())),
+            omega,
+            t: number("t")?,
+            z: number("z")?,
+        })
+    }
+}
+
+/// The vector of a name, if it is given. Whether its numbers are finite is left to the body.
+fn vector<const N: usize>(
+    text: &str,
+    table: &Named<Numbers>,
+    name: &str,
+) -> Result<Option<Location<[f64; N]>>, SceneError> {
+    let Some(given) = table.get(name) else { return Ok(None) };
+    let all = match &**given {
+        Numbers::Many(list) => <[f64; N]>::try_from(list.iter().map(|x| **x).collect::<Vec<f64>>()).ok(),
+        _ => None,
+    };
+    match all {
+        Some(vector) => Ok(Some(Location::new(vector, given.span()))),
+        None => Err(SceneError::at(text, given.span(), format!("`{name}` must be a list of {N} numbers"))),
+    }
+}
+
 /// The columns of the rows, by number.
 fn columns(text: &str, rows: Option<&Location<RowsTable>>) -> Result<Vec<usize>, SceneError> {
     let Some(names) = rows.and_then(|rows| rows.columns.as_ref()) else {
@@ -198,7 +289,7 @@ fn columns(text: &str, rows: Option<&Location<RowsTable>>) -> Result<Vec<usize>,
     names.iter().map(of).collect()
 }
 
-fn read_event(text: &str, table: &BodyEventTable) -> Result<BodyEvent, SceneError> {
+fn read_event(text: &str, table: &EventTable) -> Result<BodyEvent, SceneError> {
     let mut event = BodyEvent::parse(&table.when).map_err(|error| of_formula(text, table.when.span(), &error))?;
     event.direction = match table.direction {
         DirectionName::Rising => Direction::Rising,

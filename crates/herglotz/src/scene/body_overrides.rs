@@ -1,9 +1,10 @@
 //! Overrides of single values of a scene with a rigid body.
 
 use super::SceneError;
-use super::body_file::{BodyFile, InertiaTable};
 use super::body_quantity::BodyQuantity;
-use super::location::Location;
+use super::body_table::{BodyTable, InertiaTable};
+use super::file::File;
+use super::location::{Location, Named, Numbers};
 use super::overrides::{self, OF_RUN, SOURCE};
 
 /// The names of the vectors that are set as a whole.
@@ -11,7 +12,7 @@ const VECTORS: [&str; 5] = ["inertia", "centre", "gravity", "start.attitude", "s
 
 /// Overrides a value: a number such as `gamma=-0.2`, `inertia1=0.5` or `start.omega3=10`, a vector such as
 /// `start.omega=[0.0, 0.0, 10.0]`, or a value of the run.
-pub(super) fn apply(file: &mut BodyFile, text: &str) -> Result<(), SceneError> {
+pub(super) fn apply(file: &mut File, text: &str) -> Result<(), SceneError> {
     let refuse = |message: String| Err(SceneError::at(text, (0, text.len()), message).in_file(SOURCE));
     let pair = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
     let Some((name, value)) = pair else {
@@ -26,9 +27,8 @@ pub(super) fn apply(file: &mut BodyFile, text: &str) -> Result<(), SceneError> {
                 put_vector(file, name, [*a, *b, *c]);
                 Ok(())
             }
-            Some([w, x, y, z]) if name == "start.attitude" => {
-                let at = file.start.attitude.as_ref().map_or(file.start.span(), Location::span);
-                file.start.attitude = Some(Location::new([*w, *x, *y, *z], at));
+            Some(quaternion @ [_, _, _, _]) if name == "start.attitude" => {
+                put_in_start(file, "attitude", quaternion);
                 Ok(())
             }
             _ if name == "start.attitude" => {
@@ -71,34 +71,74 @@ fn put_entry(place: &mut Option<Location<[f64; 3]>>, i: usize, value: f64, at: (
     put(place, vector, at);
 }
 
-fn put_vector(file: &mut BodyFile, name: &str, value: [f64; 3]) {
-    let at = file.body.span();
+/// Sets a vector of the start.
+fn put_in_start(file: &mut File, name: &str, values: &[f64]) {
+    let at_system = file.system.span();
+    let start = file.start.get_or_insert(Location::new(Named::default(), at_system));
+    let at = start.get(name).map_or(start.span(), Location::span);
+    start.set(name, Location::new(Numbers::Many(values.iter().map(|x| Location::new(*x, at)).collect()), at));
+}
+
+fn put_vector(file: &mut File, name: &str, value: [f64; 3]) {
+    if name == "start.omega" {
+        return put_in_start(file, "omega", &value);
+    }
+    let Some(body) = &mut file.system.body else { return };
+    let at = body.span();
     match name {
-        "inertia" => *file.body.inertia = InertiaTable::Principal(value),
-        "centre" => put(&mut file.body.centre, value, at),
-        "gravity" => put(&mut file.body.gravity, value, at),
-        _ => *file.start.omega = value,
+        "inertia" => *body.inertia = InertiaTable::Principal(value),
+        "centre" => put(&mut body.centre, value, at),
+        _ => put(&mut body.gravity, value, at),
     }
 }
 
-fn put_number(file: &mut BodyFile, quantity: BodyQuantity, value: f64) {
-    let (of_body, of_start) = (file.body.span(), file.start.span());
-    let set = |entry: Option<&mut f64>| {
-        if let Some(entry) = entry {
-            *entry = value;
-        }
-    };
+fn put_number(file: &mut File, quantity: BodyQuantity, value: f64) {
     match quantity {
-        BodyQuantity::Inertia(i) => set(match &mut *file.body.inertia {
-            InertiaTable::Principal(moments) => moments.get_mut(i),
-            InertiaTable::Matrix(rows) => rows.get_mut(i).and_then(|row| row.get_mut(i)),
-        }),
-        BodyQuantity::Mass => put(&mut file.body.mass, value, of_body),
-        BodyQuantity::Centre(i) => put_entry(&mut file.body.centre, i, value, of_body),
-        BodyQuantity::Gravity(i) => put_entry(&mut file.body.gravity, i, value, of_body),
-        BodyQuantity::Gamma => put(&mut file.body.gamma, value, of_body),
-        BodyQuantity::Omega(i) => set(file.start.omega.get_mut(i)),
-        BodyQuantity::Action => put(&mut file.start.z, value, of_start),
-        BodyQuantity::Time => put(&mut file.start.t, value, of_start),
+        BodyQuantity::Omega(i) => {
+            let given = file.start.as_ref().and_then(|start| start.get("omega"));
+            let mut omega = match given.map(|given| &**given) {
+                Some(Numbers::Many(list)) => list.iter().map(|x| **x).collect(),
+                _ => vec![0.0; 3],
+            };
+            if let Some(entry) = omega.get_mut(i) {
+                *entry = value;
+            }
+            put_in_start(file, "omega", &omega);
+        }
+        BodyQuantity::Action => put_number_in_start(file, "z", value),
+        BodyQuantity::Time => put_number_in_start(file, "t", value),
+        _ => {
+            if let Some(body) = &mut file.system.body {
+                put_in_body(body, quantity, value);
+            }
+        }
+    }
+}
+
+fn put_number_in_start(file: &mut File, name: &str, value: f64) {
+    let at_system = file.system.span();
+    let start = file.start.get_or_insert(Location::new(Named::default(), at_system));
+    let at = start.get(name).map_or(start.span(), Location::span);
+    start.set(name, Location::new(Numbers::One(value), at));
+}
+
+fn put_in_body(body: &mut Location<BodyTable>, quantity: BodyQuantity, value: f64) {
+    let at = body.span();
+    match quantity {
+        BodyQuantity::Inertia(i) => {
+            let entry = match &mut *body.inertia {
+                InertiaTable::Principal(moments) => moments.get_mut(i),
+                InertiaTable::Matrix(rows) => rows.get_mut(i).and_then(|row| row.get_mut(i)),
+            };
+            if let Some(entry) = entry {
+                *entry = value;
+            }
+        }
+        BodyQuantity::Mass => put(&mut body.mass, value, at),
+        BodyQuantity::Centre(i) => put_entry(&mut body.centre, i, value, at),
+        BodyQuantity::Gravity(i) => put_entry(&mut body.gravity, i, value, at),
+        BodyQuantity::Gamma => put(&mut body.gamma, value, at),
+        // Those of the start.
+        BodyQuantity::Omega(_) | BodyQuantity::Action | BodyQuantity::Time => {}
     }
 }

@@ -3,6 +3,7 @@
 use super::location::Span;
 use crate::runtime::{ParseError, nearest_name};
 use std::fmt::{Display, Formatter};
+use std::ops::Range;
 
 /// An error of a scene. Its text has file, line and column, the accepted input, and the line with the position marked
 /// below it.
@@ -23,6 +24,11 @@ impl SceneError {
     /// An error at a range of bytes of a text.
     pub(crate) fn at(text: &str, span: Span, message: impl Into<String>) -> Self {
         SceneError { file: None, error: Box::new(ParseError::at(text, first_line(text, span), message)) }
+    }
+
+    /// An error of a text at a range of its bytes, or at its start.
+    pub fn of_text(text: &str, bytes: Option<Range<usize>>, message: &str) -> Self {
+        Self::at(text, bytes.map_or((0, 0), |bytes| (bytes.start, bytes.end)), plain(message))
     }
 
     /// An unknown name, with the nearest known one.

@@ -1,9 +1,13 @@
 //! The scene file format. The documentation of these types is that of the JSON schema, which editors show.
 
+use super::body_table::BodyTable;
+use super::checked::{check_version, finite};
 use super::fit_table::FitTable;
 use super::location::{Location, Named, Numbers, Span};
 use super::quantities::Quantities;
 use super::sum_of_terms::{BodiesTerms, LatticeTerms};
+use super::system::entry;
+use super::{SceneError, body_overrides, overrides};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
@@ -11,30 +15,56 @@ use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::collections::BTreeMap;
 use std::fmt::Formatter;
 
-/// The version of scene files that this program reads.
-pub(crate) const VERSION: i64 = 1;
+/// The version of scene files that this program writes. It also reads those of version 1 that have neither `[lattice]` nor
+/// `[body]`.
+pub const VERSION: i64 = 2;
 
-/// The position of a table of this name, which determines the kind of a scene. Errors of the scene itself are left to
-/// its reader.
+/// Reads a scene file, of whatever kind, and overrides some of its values.
+///
+/// # Errors
+/// [`SceneError`] with the position in the text, or in the override.
+pub(crate) fn read(text: &str, changes: &[String]) -> Result<File, SceneError> {
+    check_version(text)?;
+    let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+    if file.system.body.is_some() {
+        changes.iter().try_for_each(|change| body_overrides::apply(&mut file, change))?;
+    } else {
+        let entry = entry(text, &file.system)?;
+        changes.iter().try_for_each(|change| overrides::apply(&mut file, entry, change))?;
+    }
+    Ok(file)
+}
+
+/// The position of a table of this name. Errors of the scene itself are left to its reader.
 pub(crate) fn span_of_table(text: &str, name: &str) -> Option<Span> {
     toml::from_str::<BTreeMap<String, Location<IgnoredAny>>>(text).ok()?.get(name).map(Location::span)
 }
 
-/// A motion of a Lagrangian, and the requested output.
+/// A motion from a start, or a path between two ends, and the requested output.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a scene")]
 #[schemars(title = "Scene")]
 pub(crate) struct File {
-    /// The version of the format: 1.
+    /// The version of the format: 2. A scene of version 1 with `[lattice]` or `[body]` is translated by `herglotz migrate`.
     #[expect(dead_code, reason = "it is looked at before all else is read")]
     pub version: Option<Location<i64>>,
-    /// The Lagrangian or the Hamiltonian: a formula, or a system of the catalogue.
+    /// The Lagrangian or the Hamiltonian: a formula, a system of the catalogue, a lattice, bodies, or a rigid body.
     pub system: Location<SystemTable>,
     /// The initial state: a number for each coordinate `x`, and for its velocity `x'` or its momentum `p_x`; the action
-    /// `z` and the time `t` default to 0. An array of coordinates has a list, or one number for all its entries. A
-    /// system of the catalogue has a default initial state.
+    /// `z` and the time `t` default to 0. An array of coordinates has a list, one number for all its entries, or a formula in
+    /// the index `i` of an entry, counted from 0, and the number `n` of entries; so has a component of all sites of a lattice,
+    /// in several directions with the indices `i`, `j` and `k`. Velocities of a lattice default to 0. A system of the catalogue
+    /// has a default initial state. A rigid body has an `attitude`, which takes the body to space, a unit quaternion with the
+    /// real part first, by default `[1, 0, 0, 0]`, and the angular velocity `omega` in the body. A path starts from coordinates
+    /// alone.
     #[serde(default)]
     pub start: Option<Location<Named<Numbers>>>,
+    /// The end of a path: a number for each coordinate `x`, and the time `t`. With it the scene is a path between two positions
+    /// that is critical for the discrete action of Herglotz' principle, or satisfies its equations with forces. Its run has
+    /// the number of `steps` and an `integrator` that is a Gauss method, by default `gauss_4`, or a quadrature rule such as
+    /// `midpoint`.
+    #[serde(default)]
+    pub ends: Option<Location<Named<Numbers>>>,
     /// Forces beside those of the Lagrangian: for a coordinate `x` the force f in `d/dt L_v - L_q - L_z L_v = f(t, q,
     /// v, z)` as a formula, as in `x = "-c*x'*abs(x')"`; `"u[2]"` is an entry of an array, and `"u[i]"` are all of its
     /// entries. `rayleigh` is Rayleigh's dissipation function R, whose force is `-dR/dv`. With a force the motion is
@@ -54,7 +84,8 @@ pub(crate) struct File {
     #[serde(default)]
     pub want: WantTable,
     /// Parameters, or values of the initial state such as `start.theta`, over whose values `herglotz sweep` runs. With
-    /// several of them all combinations are run; the last one varies fastest.
+    /// several of them all combinations are run; the last one varies fastest. Those of a rigid body are `inertia1`, `inertia2`,
+    /// `inertia3`, `mass`, `centre1`, ..., `gravity1`, ..., `gamma`, `start.omega1`, ..., `start.z`.
     #[serde(default)]
     pub sweep: Quantities<Values>,
     /// Data to which `herglotz fit` fits parameters and the initial state.
@@ -85,7 +116,7 @@ impl FrictionTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(
     deny_unknown_fields,
-    expecting = "a table with `coordinates` and `lagrangian` or `hamiltonian`, or with `catalogue`, `lattice` or `bodies`"
+    expecting = "a table with `coordinates` and `lagrangian` or `hamiltonian`, or with `catalogue`, `lattice`, `bodies` or `body`"
 )]
 pub(crate) struct SystemTable {
     /// The name of a system of the catalogue; see `herglotz list systems`.
@@ -106,11 +137,14 @@ pub(crate) struct SystemTable {
     /// expressions that vanish. The motion is then that on the surface where they hold. `gauss_4` means a contact Lobatto
     /// method of the same order, and a splitting means RATTLE that is composed by its scheme.
     pub constraints: Option<Location<Vec<Location<String>>>>,
-    /// In place of L, a lattice of up to 256 coordinates. `coordinates` are then the components at a site, by default `x`; in all
-    /// other formulas they are `x[0]`, `x[1]` and so on, or with several components `x_0`, `y_0`, `x_1` and so on.
+    /// In place of L, a lattice. `coordinates` are then the components at a site, by default `x`; in all other formulas they are
+    /// `x[0]`, `x[1]` and so on, or with several components `x_0`, `y_0`, `x_1` and so on. With more than 256 coordinates a
+    /// lattice runs with given steps of a splitting, of `midpoint`, `gauss_1` or `gauss_2`, and its rows are the whole state.
     pub lattice: Option<Location<LatticeTerms>>,
     /// In place of L, bodies with Newtonian gravitation.
     pub bodies: Option<Location<BodiesTerms>>,
+    /// In place of L, a rigid body about a fixed point.
+    pub body: Option<Location<BodyTable>>,
     /// The parameters with their values.
     #[serde(default)]
     pub parameters: Named<f64>,
@@ -120,8 +154,8 @@ pub(crate) struct SystemTable {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `time` and `accuracy`, or `time`, `integrator` and `step`")]
 pub(crate) struct RunTable {
-    /// The final time; the motion runs backward where it is before the initial time.
-    pub time: Location<f64>,
+    /// The final time; the motion runs backward where it is before the initial time. A path has that of its end.
+    pub time: Option<Location<f64>>,
     /// The relative error of (q, p) and of v. The step is chosen for it, and also the integrator unless one is named.
     pub accuracy: Option<Location<f64>>,
     /// The integrator; see `herglotz list integrators`.
@@ -131,12 +165,10 @@ pub(crate) struct RunTable {
     /// The number of steps, instead of their length.
     pub steps: Option<Location<usize>>,
     /// Whether a start that violates the constraints is moved to them; otherwise it is refused, with its distance.
-    #[serde(default)]
-    pub project: bool,
+    pub project: Option<Location<bool>>,
     /// Whether rows and events within steps are computed by steps of the integrator that end there, so that the map to each of
     /// them is contact. Otherwise they are on polynomials, which are as accurate and take less time.
-    #[serde(default)]
-    pub exact: bool,
+    pub exact: Option<Location<bool>>,
     /// The size of each coordinate, in the order of the coordinates, where they differ much: the errors of each
     /// coordinate and its velocity are measured in units of its size.
     pub scales: Option<Location<Vec<f64>>>,
@@ -178,6 +210,24 @@ pub(crate) enum PiecesName {
     Cubic,
 }
 
+impl RunTable {
+    /// The final time of a motion.
+    ///
+    /// # Errors
+    /// [`SceneError`] where it is missing or not finite.
+    pub fn end(&self, text: &str, at: Span) -> Result<f64, SceneError> {
+        match &self.time {
+            Some(time) => finite(text, time, "time"),
+            None => Err(SceneError::at(text, at, "the run has no `time`; add it, as in time = 10.0")),
+        }
+    }
+
+    /// The position of a key, or that of the table.
+    pub fn span_of<T>(key: &Option<Location<T>>, at: Span) -> Span {
+        key.as_ref().map_or(at, Location::span)
+    }
+}
+
 /// The output.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "a table with `rows` and `events`")]
@@ -191,11 +241,9 @@ pub(crate) struct WantTable {
     #[serde(default)]
     pub wrap: Vec<Location<String>>,
     /// Whether the summary has the conformal factor of the whole motion.
-    #[serde(default)]
-    pub conformal_factor: bool,
+    pub conformal_factor: Option<Location<bool>>,
     /// Whether the error of given steps is estimated, by a second run with steps of half the length.
-    #[serde(default)]
-    pub estimate: bool,
+    pub estimate: Option<Location<bool>>,
 }
 
 /// The times of the rows, by one of `every`, `at` and `every_step`, and their columns.
@@ -211,7 +259,10 @@ pub(crate) struct RowsTable {
     /// `t`, coordinates, velocities, `z`, momenta `p_x`, `energy`, `sigma`, `log_factor`, and any expressions in these,
     /// with a name (`E = ...`) or without; by default, the whole state. `energy` is `v L_v - L`, including the terms of
     /// L in z (`-gamma*z` for a drag `gamma*z`); `log_factor` is the integral of `L_z`, and `sigma`, its exponential,
-    /// is the conformal factor.
+    /// is the conformal factor. The columns of a rigid body are `t`, the attitude `q_w`, `q_x`, `q_y`, `q_z`, the momentum in the
+    /// body `Pi1`, `Pi2`, `Pi3`, the angular velocity in the body `omega1`, `omega2`, `omega3`, the momentum in space `M1`,
+    /// `M2`, `M3`, the centre of mass in space `tip_x`, `tip_y`, `tip_z` (the end of the third axis where the centre is fixed),
+    /// `energy` and `z`.
     pub columns: Option<Location<Vec<Location<String>>>>,
 }
 

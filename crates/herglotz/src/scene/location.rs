@@ -130,7 +130,7 @@ impl<T: JsonSchema> JsonSchema for Named<T> {
     }
 }
 
-/// A number, or a list of numbers.
+/// A number, a list of numbers, or a formula in the index of an array.
 #[derive(Clone, Debug, JsonSchema)]
 #[schemars(untagged, inline)]
 pub(crate) enum Numbers {
@@ -138,6 +138,8 @@ pub(crate) enum Numbers {
     One(f64),
     /// One number for each entry of an array.
     Many(Vec<Location<f64>>),
+    /// A formula in the index of an entry.
+    Formula(String),
 }
 
 impl<'de> Deserialize<'de> for Numbers {
@@ -147,7 +149,7 @@ impl<'de> Deserialize<'de> for Numbers {
             type Value = Numbers;
 
             fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a number or a list of numbers")
+                f.write_str("a number, a list of numbers, or a formula in the index of an array")
             }
 
             fn visit_f64<E>(self, x: f64) -> Result<Numbers, E> {
@@ -156,6 +158,10 @@ impl<'de> Deserialize<'de> for Numbers {
 
             fn visit_i64<E>(self, x: i64) -> Result<Numbers, E> {
                 Ok(Numbers::One(x as f64))
+            }
+
+            fn visit_str<E>(self, formula: &str) -> Result<Numbers, E> {
+                Ok(Numbers::Formula(formula.to_owned()))
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Numbers, A::Error> {

@@ -1,9 +1,10 @@
 //! Scenes: a system, an initial state or two ends, and the requested output.
 
+mod any;
 mod body;
-mod body_file;
 mod body_overrides;
 mod body_quantity;
+mod body_table;
 mod checked;
 mod combinations;
 mod constraints;
@@ -18,8 +19,10 @@ mod lattice;
 mod location;
 mod members;
 mod motion;
+mod only;
 mod output;
 mod overrides;
+mod profile;
 mod quantities;
 mod resets;
 mod start;
@@ -29,10 +32,12 @@ mod sweep;
 mod system;
 mod tables;
 
+pub use any::AnyScene;
 pub use body::BodyScene;
 pub use combinations::Combinations;
 pub use ends::EndsScene;
 pub use error::SceneError;
+pub use file::VERSION;
 pub use lattice::LatticeScene;
 pub use members::Members;
 pub use motion::Scene;
@@ -40,15 +45,5 @@ pub use sweep::SweptQuantity;
 
 /// The JSON schema of scene files.
 pub fn schema() -> serde_json::Value {
-    /// A motion of a Lagrangian, of a lattice or of a rigid body with the requested output, or a path between two ends.
-    #[derive(schemars::JsonSchema)]
-    #[schemars(title = "Scene", untagged)]
-    #[expect(dead_code, reason = "it stands for its variants, which are read one by one")]
-    enum AnyFile {
-        System(file::File),
-        Lattice(lattice::LatticeFile),
-        Ends(ends::EndsFile),
-        Body(body_file::BodyFile),
-    }
-    schemars::schema_for!(AnyFile).to_value()
+    schemars::schema_for!(file::File).to_value()
 }

@@ -1,18 +1,19 @@
 //! Scenes of motions from an initial state.
 
-use super::checked::{check_version, finite};
 use super::constraints::with_constraints;
-use super::file::{self, EventTable, File};
+use super::file::{self, EventTable, File, RunTable};
 use super::fit::{self, SceneFit};
 use super::forces::{with_forces, with_friction};
 use super::location::{Location, Named, Span};
 use super::members::Members;
+use super::only::set;
 use super::output::{self, EventColumns, Events, RowTimes, times_in_order};
 use super::resets::with_resets;
+use super::start::StartNames;
 use super::step_control::step_control;
 use super::sweep::{self, SweptQuantity};
 use super::system::{check_used, entry, formula};
-use super::{SceneError, overrides, start, sum_of_terms, tables};
+use super::{SceneError, start, sum_of_terms, tables};
 use crate::runtime::{
     AfterReset, Column, Crossing, Event, InputError, Motion, MotionFit, RuntimeError, SelectionFailure, Start,
     StepControl, StepError, System, Table, in_words, velocity_name,
@@ -109,44 +110,42 @@ impl Scene {
     /// # Errors
     /// Those of [`read_with`](Self::read_with).
     pub fn read_in(text: &str, changes: &[String], folder: &Path) -> Result<Self, SceneError> {
-        check_version(text)?;
-        if let Some(lattice) = file::span_of_table(text, "lattice") {
-            let message = "a lattice works only with `herglotz run`; for the other commands, and up to 256 coordinates, give it as \
-                           [system.lattice]";
-            return Err(SceneError::at(text, lattice, message));
-        }
-        if let Some(body) = file::span_of_table(text, "body") {
+        let file = file::read(text, changes)?;
+        if let Some(body) = &file.system.body {
             let message = "a rigid body works only with `herglotz run`, `plan`, `check` and `sweep`; the other commands are for \
                            systems given by formulas";
-            return Err(SceneError::at(text, body, message));
+            return Err(SceneError::at(text, body.span(), message));
         }
-        if let Some(ends) = file::span_of_table(text, "ends") {
+        if let Some(ends) = &file.ends {
             let message = "a path between ends works only with `herglotz run`; the other commands are for motions \
                            from a start";
-            return Err(SceneError::at(text, ends, message));
+            return Err(SceneError::at(text, ends.span(), message));
         }
-        let mut file: File = toml::from_str(text).map_err(|error| SceneError::of_format(text, &error))?;
+        Self::of(text, &file, folder)
+    }
+
+    /// Reads the tables of a scene.
+    pub(super) fn of(text: &str, file: &File, folder: &Path) -> Result<Self, SceneError> {
         let entry = entry(text, &file.system)?;
-        for text_of_change in changes {
-            overrides::apply(&mut file, entry, text_of_change)?;
-        }
         let tables = tables::read(text, folder, &file.tables)?;
         let formula = formula(text, &file.system, entry, &tables)?;
         let formula = with_forces(text, formula, file.force.as_ref())?;
         let formula = with_constraints(text, formula, file.system.constraints.as_ref())?;
         let (system, run) = (&file.system, &file.run);
         let header = file.start.as_ref().map_or(system.span(), Location::span);
-        let start = start::read(text, &formula, file.start.as_deref(), entry, header)?;
+        let lattice = sum_of_terms::lattice(system);
+        let names = StartNames::of(&formula).with_lattice(lattice.as_ref());
+        let start = start::read(text, &names, file.start.as_deref(), entry, header)?;
         let formula = with_friction(text, formula, &file.friction)?;
-        let end = finite(text, &run.time, "time")?;
+        let end = run.end(text, run.span())?;
         let breaks = run.breaks.as_deref().map(Vec::as_slice).unwrap_or_default();
         let breaks = times_in_order(text, breaks, "breaks", (start.t, end))?;
         let with_breaks = formula.with_breaks(&breaks);
         let formula = with_breaks.map_err(|error| SceneError::at(text, run.span(), error.to_string()))?;
         let (formula, resets) = with_resets(text, formula, &file.want.events)?;
-        let texts: Vec<&str> = expressions(&file).map(String::as_str).collect();
+        let texts: Vec<&str> = expressions(file).map(String::as_str).collect();
         check_used(text, &formula, system, &texts)?;
-        tables::check_used(text, &tables, || all_formulas(&file))?;
+        tables::check_used(text, &tables, || all_formulas(file))?;
         let source = system.lagrangian.as_ref().or(system.hamiltonian.as_ref());
         let lagrangian = source.map_or(system.span(), Location::span);
         let runs = System::new(&formula).map_err(|error| output::of_formula(text, lagrangian, &error))?;
@@ -180,8 +179,8 @@ impl Scene {
             },
             rows: RowTimes::read(text, file.want.rows.as_ref(), (start.t, end))?,
             system: runs,
-            expressions: expressions(&file).cloned().collect(),
-            additions: additions(&file, &tables),
+            expressions: expressions(file).cloned().collect(),
+            additions: additions(file, &tables),
             lagrangian: match (entry, source, sum_of_terms::read(text, system)?) {
                 (Some(entry), ..) => entry.lagrangian.to_owned(),
                 (None, Some(own), _) => (**own).clone(),
@@ -190,21 +189,21 @@ impl Scene {
             start,
             end,
             step_control,
-            conformal_factor: file.want.conformal_factor,
-            estimate: file.want.estimate,
+            conformal_factor: set(&file.want.conformal_factor).is_some(),
+            estimate: set(&file.want.estimate).is_some(),
             scales: run.scales.as_deref().cloned(),
-            project: run.project,
-            exact: run.exact,
+            project: set(&run.project).is_some(),
+            exact: set(&run.exact).is_some(),
             text: text.to_owned(),
             spans: Spans {
                 lagrangian,
                 force: file.force.as_ref().map_or(header, Location::span),
                 start: header,
                 run: run.span(),
-                time: run.time.span(),
-                accuracy: run.accuracy.as_ref().map_or(run.span(), Location::span),
-                scales: run.scales.as_ref().map_or(run.span(), Location::span),
-                integrator: run.integrator.as_ref().map_or(run.span(), Location::span),
+                time: RunTable::span_of(&run.time, run.span()),
+                accuracy: RunTable::span_of(&run.accuracy, run.span()),
+                scales: RunTable::span_of(&run.scales, run.span()),
+                integrator: RunTable::span_of(&run.integrator, run.span()),
                 step: run
                     .step
                     .as_ref()
@@ -433,9 +432,12 @@ fn additions(file: &File, tables: &[(Location<String>, Table)]) -> String {
     let breaks: Vec<f64> = file.run.breaks.iter().flat_map(|breaks| breaks.iter()).map(|t| **t).collect();
     let constraints: Vec<&str> =
         file.system.constraints.iter().flat_map(|all| all.iter()).map(|c| c.as_str()).collect();
-    let constraints =
-        if constraints.is_empty() { String::new() } else { format!(" {constraints:?} {}", file.run.project) };
-    let exact = if file.run.exact { " exact" } else { "" };
+    let constraints = if constraints.is_empty() {
+        String::new()
+    } else {
+        format!(" {constraints:?} {}", set(&file.run.project).is_some())
+    };
+    let exact = if set(&file.run.exact).is_some() { " exact" } else { "" };
     let friction: Vec<String> = file
         .friction
         .0

@@ -76,7 +76,7 @@ pub(super) fn apply_to_run(
         *place = Some(Location::new(value, place.as_ref().map_or(at_run, Location::span)));
     };
     match name {
-        "run.time" => *run.time = value,
+        "run.time" => put(&mut run.time),
         "run.accuracy" => {
             (run.step, run.steps) = (None, None);
             put(&mut run.accuracy);

@@ -3,7 +3,8 @@
 use super::SceneError;
 use super::checked::finite;
 use super::location::{Location, Named, Numbers, Span};
-use crate::runtime::{CatalogueEntry, Formula, InitialVelocity, Start, velocity_name};
+use super::profile;
+use crate::runtime::{CatalogueEntry, Formula, InitialVelocity, Lattice, Start, velocity_name};
 use std::ops::Range;
 
 /// A part of the initial state.
@@ -16,29 +17,134 @@ pub(crate) enum Part {
     Time,
 }
 
-/// A name that may occur in an initial state, with its meaning: a range of entries of a part.
+/// The names of an initial state.
+pub(crate) struct StartNames<'f> {
+    /// The coordinates; those of a large lattice are left out, whose start is given by its components alone.
+    coordinates: Vec<String>,
+    momenta: Vec<String>,
+    action: &'f str,
+    is_hamiltonian: bool,
+    /// The components at a site of a lattice, with the number of sites along each direction.
+    lattice: Option<(&'f [String], &'f [usize])>,
+    parameters: Vec<(String, f64)>,
+    dimension: usize,
+}
+
+impl<'f> StartNames<'f> {
+    /// Those of a formula.
+    pub fn of(formula: &'f Formula) -> Self {
+        StartNames {
+            coordinates: formula.coordinates(),
+            momenta: formula.momenta(),
+            action: formula.action(),
+            is_hamiltonian: formula.is_hamiltonian(),
+            lattice: None,
+            parameters: formula.parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
+            dimension: formula.dimension(),
+        }
+    }
+
+    /// With those of the components of all sites of a lattice, if it is one.
+    pub fn with_lattice(self, lattice: Option<&'f Lattice>) -> Self {
+        let lattice = lattice.map(|lattice| (lattice.coordinates.as_slice(), lattice.sizes.as_slice()));
+        StartNames { lattice, ..self }
+    }
+
+    /// Those of a lattice of any number of sites.
+    pub fn of_lattice(lattice: &'f Lattice) -> Self {
+        StartNames {
+            coordinates: Vec::new(),
+            momenta: Vec::new(),
+            action: "z",
+            is_hamiltonian: false,
+            lattice: Some((&lattice.coordinates, &lattice.sizes)),
+            parameters: lattice.parameters.clone(),
+            dimension: lattice.coordinates.len() * lattice.sizes.iter().product::<usize>(),
+        }
+    }
+
+    /// The single number at a site of a lattice whose coordinates are left out: `x[3]`, `x'[3]`, `p_x[3]`, or with several
+    /// components `x_3`, `x_3'`, `p_x_3`.
+    fn of_large_lattice(&self, name: &str) -> Option<Key> {
+        let (components, _) = self.lattice.filter(|_| self.coordinates.is_empty())?;
+        let (component, site, quote) = match components {
+            [_] => name.strip_suffix(']')?.split_once('[').map(|(component, site)| (component, site, ""))?,
+            _ => {
+                let bare = name.strip_suffix('\'').unwrap_or(name);
+                let (component, site) = bare.rsplit_once('_')?;
+                (component, site, &name[bare.len()..])
+            }
+        };
+        let component = format!("{component}{quote}");
+        let named = components.iter().enumerate().flat_map(|(c, x)| names_of(x).map(|(name, part)| (name, part, c)));
+        let (_, part, c) = named.into_iter().find(|(name, ..)| *name == component)?;
+        let entry = site.parse::<usize>().ok()?.checked_mul(components.len())?.checked_add(c)?;
+        (entry < self.dimension).then(|| Key::single(name.to_owned(), part, entry))
+    }
+}
+
+/// A name that may occur in an initial state, with its meaning: entries of a part, `count` of them from `first` on in a
+/// stride.
 struct Key {
     name: String,
     part: Part,
-    entries: Range<usize>,
-    is_list: bool,
+    first: usize,
+    stride: usize,
+    /// The number of entries along each direction of an array; none for a single number.
+    sizes: Option<Vec<usize>>,
+}
+
+impl Key {
+    fn count(&self) -> usize {
+        self.sizes.as_ref().map_or(1, |sizes| sizes.iter().product())
+    }
+
+    fn single(name: String, part: Part, entry: usize) -> Self {
+        Key { name, part, first: entry, stride: 1, sizes: None }
+    }
+}
+
+/// The names of a coordinate of a Lagrangian, of its velocity and of its momentum.
+fn names_of(x: &str) -> [(String, Part); 3] {
+    [(x.to_owned(), Part::Position), (velocity_name(x), Part::Velocity), (format!("p_{x}"), Part::Momentum)]
 }
 
 /// All names that may occur in an initial state.
-fn keys(formula: &Formula) -> Vec<Key> {
-    let names = formula.coordinates();
-    let velocities: Vec<String> = names.iter().map(|name| velocity_name(name)).collect();
+fn keys(names: &StartNames<'_>) -> Vec<Key> {
+    let velocities: Vec<String> = names.coordinates.iter().map(|name| velocity_name(name)).collect();
     let mut keys = Vec::new();
-    for (names, part) in [(names, Part::Position), (velocities, Part::Velocity), (formula.momenta(), Part::Momentum)] {
-        let arrays = arrays(&names);
-        let single = names.into_iter().enumerate().map(|(i, name)| (name, i..i + 1, false));
-        let arrays = arrays.into_iter().map(|(name, entries)| (name, entries, true));
-        let of_part = single.chain(arrays);
-        keys.extend(of_part.map(|(name, entries, is_list)| Key { name, part, entries, is_list }));
+    let parts = [(&names.coordinates, Part::Position), (&velocities, Part::Velocity), (&names.momenta, Part::Momentum)];
+    for (of_part, part) in parts {
+        keys.extend(of_part.iter().enumerate().map(|(i, name)| Key::single(name.clone(), part, i)));
+        if names.lattice.is_none() {
+            let arrays = arrays(of_part).into_iter();
+            let of = |(name, entries): (String, Range<usize>)| Key {
+                name,
+                part,
+                first: entries.start,
+                stride: 1,
+                sizes: Some(vec![entries.len()]),
+            };
+            keys.extend(arrays.map(of));
+        }
     }
-    for (name, part) in [(formula.action(), Part::Action), ("t", Part::Time)] {
-        keys.push(Key { name: name.into(), part, entries: 0..1, is_list: false });
+    if let Some((components, sizes)) = names.lattice {
+        let each = |c: usize, name: String, part: Part| Key {
+            name,
+            part,
+            first: c,
+            stride: components.len(),
+            sizes: Some(sizes.to_vec()),
+        };
+        for (c, x) in components.iter().enumerate() {
+            keys.push(each(c, x.clone(), Part::Position));
+            keys.push(each(c, velocity_name(x), Part::Velocity));
+            keys.push(each(c, format!("p_{x}"), Part::Momentum));
+        }
     }
+    keys.extend(
+        [(names.action, Part::Action), ("t", Part::Time)].map(|(name, part)| Key::single(name.into(), part, 0)),
+    );
     keys
 }
 
@@ -57,13 +163,13 @@ fn arrays(names: &[String]) -> Vec<(String, Range<usize>)> {
 
 /// The part and the entry that a name of a single number refers to.
 pub(crate) fn entry_of(formula: &Formula, name: &str) -> Option<(Part, usize)> {
-    let key = keys(formula).into_iter().find(|key| key.name == name && !key.is_list)?;
-    Some((key.part, key.entries.start))
+    let key = keys(&StartNames::of(formula)).into_iter().find(|key| key.name == name && key.sizes.is_none())?;
+    Some((key.part, key.first))
 }
 
 /// The names of single numbers, for messages.
 pub(crate) fn single_names(formula: &Formula) -> Vec<String> {
-    keys(formula).into_iter().filter(|key| !key.is_list).map(|key| key.name).collect()
+    keys(&StartNames::of(formula)).into_iter().filter(|key| key.sizes.is_none()).map(|key| key.name).collect()
 }
 
 /// The initial state as far as a file gives it.
@@ -94,12 +200,12 @@ impl Given {
 /// The initial state of a table, completed by that of the catalogue entry.
 pub(crate) fn read(
     text: &str,
-    formula: &Formula,
+    names: &StartNames<'_>,
     table: Option<&Named<Numbers>>,
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
-    complete(text, given(text, keys(formula), "the start", table)?, formula, entry, at)
+    complete(text, given(text, names, keys(names), "the start", table)?, names, entry, at)
 }
 
 /// The ends of a path: the times, the positions, and the action of the start.
@@ -113,23 +219,25 @@ impl Ends {
     /// The ends from two tables; the start is completed by that of the catalogue entry.
     pub fn read(
         text: &str,
-        formula: &Formula,
+        (formula, lattice): (&Formula, Option<&Lattice>),
         (start, start_at): (Option<&Named<Numbers>>, Span),
         (end, end_at): (&Named<Numbers>, Span),
         entry: Option<&CatalogueEntry>,
     ) -> Result<Self, SceneError> {
-        let names = formula.coordinates();
+        let of = StartNames::of(formula).with_lattice(lattice);
+        let names = &of.coordinates;
         let keys_of = |parts: &[Part]| {
-            let mut keys = keys(formula);
+            let mut keys = keys(&of);
             keys.retain(|key| parts.contains(&key.part));
             keys
         };
-        let of_start = given(text, keys_of(&[Part::Position, Part::Action, Part::Time]), "the start of a path", start)?;
-        let of_end = given(text, keys_of(&[Part::Position, Part::Time]), "the end of a path", Some(end))?;
-        let q0 = all(text, &names, of_start.q, entry.map(|entry| entry.q), ["coordinate", "start"], start_at, &|x| {
+        let of_start = keys_of(&[Part::Position, Part::Action, Part::Time]);
+        let of_start = given(text, &of, of_start, "the start of a path", start)?;
+        let of_end = given(text, &of, keys_of(&[Part::Position, Part::Time]), "the end of a path", Some(end))?;
+        let q0 = all(text, names, of_start.q, entry.map(|entry| entry.q), ["coordinate", "start"], start_at, &|x| {
             x.to_owned()
         })?;
-        let q1 = all(text, &names, of_end.q, None, ["coordinate", "end"], end_at, &|x| x.to_owned())?;
+        let q1 = all(text, names, of_end.q, None, ["coordinate", "end"], end_at, &|x| x.to_owned())?;
         let Some(t1) = of_end.t else {
             return Err(SceneError::at(
                 text,
@@ -143,32 +251,50 @@ impl Ends {
 }
 
 /// The values that a table gives for these names.
-fn given(text: &str, keys: Vec<Key>, what: &str, table: Option<&Named<Numbers>>) -> Result<Given, SceneError> {
-    let count = keys.iter().map(|key| key.entries.end).max().unwrap_or(0);
-    let none = || vec![None; count];
+fn given(
+    text: &str,
+    names: &StartNames<'_>,
+    keys: Vec<Key>,
+    what: &str,
+    table: Option<&Named<Numbers>>,
+) -> Result<Given, SceneError> {
+    let none = || vec![None; names.dimension];
     let mut given = Given { q: none(), v: none(), p: none(), ..Given::default() };
     for (name, numbers) in table.map(|table| table.0.as_slice()).unwrap_or_default() {
-        let Some(key) = keys.iter().find(|key| key.name == **name) else {
+        let own = names.of_large_lattice(name);
+        let Some(key) = keys.iter().find(|key| key.name == **name).or(own.as_ref()) else {
             let known = || keys.iter().map(|key| key.name.as_str());
             let all = known().collect::<Vec<_>>().join(", ");
             let message = format!("unknown name `{}` in {what}; the known names are {all}", **name);
             return Err(SceneError::unknown(text, name.span(), name, known(), message));
         };
-        let wrong_count = |found: &str| {
-            let expected = match key.entries.len() {
-                _ if !key.is_list => "a number".to_owned(),
-                count => format!("a list of {count} numbers, or one number for all"),
+        let refuse = |found: &str| {
+            let expected = match key.sizes {
+                None => "a number".to_owned(),
+                Some(_) => format!("a list of {} numbers, one number for all, or a formula in `i`", key.count()),
             };
             SceneError::at(text, numbers.span(), format!("`{}` is {found}; it must be {expected}", **name))
         };
-        let values: Vec<Location<f64>> = match &**numbers {
+        let entry = |k: usize| key.first + k * key.stride;
+        match (&**numbers, &key.sizes) {
             // For an array, the number is the value of all its entries.
-            Numbers::One(x) => vec![Location::new(*x, numbers.span()); key.entries.len()],
-            Numbers::Many(list) if key.is_list && list.len() == key.entries.len() => list.clone(),
-            Numbers::Many(list) => return Err(wrong_count(&format!("a list of length {}", list.len()))),
-        };
-        for (i, x) in key.entries.clone().zip(&values) {
-            given.set(key.part, i, finite(text, x, name)?);
+            (Numbers::One(x), _) => {
+                let x = finite(text, &Location::new(*x, numbers.span()), name)?;
+                (0..key.count()).for_each(|k| given.set(key.part, entry(k), x));
+            }
+            (Numbers::Many(list), Some(_)) if list.len() == key.count() => {
+                for (k, x) in list.iter().enumerate() {
+                    given.set(key.part, entry(k), finite(text, x, name)?);
+                }
+            }
+            (Numbers::Many(list), _) => return Err(refuse(&format!("a list of length {}", list.len()))),
+            (Numbers::Formula(formula), Some(sizes)) => {
+                let at = Location::new(formula.as_str(), numbers.span());
+                for (k, x) in profile::values(text, name, &at, sizes, &names.parameters)?.into_iter().enumerate() {
+                    given.set(key.part, entry(k), x);
+                }
+            }
+            (Numbers::Formula(_), None) => return Err(refuse("a text")),
         }
     }
     Ok(given)
@@ -202,17 +328,39 @@ fn all(
     Ok(all)
 }
 
+/// The numbers of all sites of a lattice of any number of sites.
+fn all_of_lattice(
+    text: &str,
+    components: &[String],
+    given: Vec<Option<f64>>,
+    what: &str,
+    at: Span,
+    name: &dyn Fn(&str) -> String,
+) -> Result<Vec<f64>, SceneError> {
+    let missing = |entry: usize| {
+        let component = components.get(entry % components.len()).map_or("x", String::as_str);
+        let name = if what == "momentum" { format!("p_{component}") } else { name(component) };
+        let message = format!(
+            "the {what} `{name}` has no value at the start; add `{name} = 0.0` to [start], or a formula in `i`"
+        );
+        SceneError::at(text, at, message)
+    };
+    given.into_iter().enumerate().map(|(entry, x)| x.ok_or_else(|| missing(entry))).collect()
+}
+
 /// The complete initial state of a motion.
 fn complete(
     text: &str,
     given: Given,
-    formula: &Formula,
+    names: &StartNames<'_>,
     entry: Option<&CatalogueEntry>,
     at: Span,
 ) -> Result<Start, SceneError> {
-    let (names, momenta) = (formula.coordinates(), formula.momenta());
     let of = |given: Vec<Option<f64>>, of_entry: Option<&[f64]>, what: &str, name: &dyn Fn(&str) -> String| {
-        let names = if what == "momentum" { &momenta } else { &names };
+        if let (Some((components, _)), true) = (names.lattice, names.coordinates.is_empty()) {
+            return all_of_lattice(text, components, given, what, at, name);
+        }
+        let names = if what == "momentum" { &names.momenta } else { &names.coordinates };
         all(text, names, given, of_entry, [what, "start"], at, name)
     };
     let q = of(given.q, entry.map(|entry| entry.q), "coordinate", &|x| x.to_owned())?;
@@ -222,8 +370,10 @@ fn complete(
         return Err(SceneError::at(text, at, message));
     }
     let by_velocity = given.v.iter().any(Option::is_some);
-    let velocity = if by_momentum || formula.is_hamiltonian() && !by_velocity {
+    let velocity = if by_momentum || names.is_hamiltonian && !by_velocity {
         InitialVelocity::Momentum(of(given.p, None, "momentum", &|p| p.to_owned())?)
+    } else if names.lattice.is_some() {
+        InitialVelocity::Velocity(given.v.into_iter().map(|v| v.unwrap_or(0.0)).collect())
     } else {
         InitialVelocity::Velocity(of(given.v, entry.map(|entry| entry.v), "velocity", &velocity_name)?)
     };

@@ -5,7 +5,7 @@ use herglotz::BodyScene;
 use herglotz::runtime::RuntimeError;
 
 /// A top that nods, with an event.
-pub const TOP: &str = r#"[body]
+pub const TOP: &str = r#"[system.body]
 inertia = [0.234375, 0.46875, 0.234375]
 mass = 15.0
 centre = [0.0, 1.0, 0.0]
@@ -78,6 +78,28 @@ fn wrong_bodies_are_refused() {
         ("\"Pi2\"", "\"Pi4\"", "line 15, column 40: unknown column `Pi4`"),
         ("tip_z + 0.3", "tip_w + 0.3", "line 16, column 21: unknown name `tip_w`"),
         ("tip_z + 0.3", "energy", "line 16, column 20: `when` contains `energy`"),
+        (
+            "omega = [",
+            "spin = [",
+            "line 9, column 1: unknown name `spin` in the start of a rigid body; the known names are attitude",
+        ),
+        (
+            "omega = [0.0, 150.0, -4.61538]\n",
+            "",
+            "line 7, column 1: the start has no `omega`, the angular velocity in the body",
+        ),
+        ("[0.0, 150.0, -4.61538]", "\"i\"", "line 9, column 9: `omega` must be a list of 3 numbers"),
+        ("[start]", "[start]\nz = [0.0]", "line 8, column 5: `z` must be a number"),
+        ("time = 1.0\n", "", "line 10, column 1: the run has no `time`"),
+        ("[run]", "[force]\nx = \"1\"\n[run]", "line 10, column 1: `force` does not apply to a rigid body"),
+        ("[run]", "[run]\nexact = true", "line 11, column 9: `exact` does not apply to a rigid body"),
+        ("terminal = true", "then = { omega1 = \"0\" }", "line 16, column 65: `then` does not apply to a rigid body"),
+        ("[want]", "[want]\nestimate = true", "line 15, column 12: `estimate` does not apply to a rigid body"),
+        (
+            "[start]",
+            "[system]\nparameters = { k = 1.0 }\n[start]",
+            "line 8, column 16: `parameters` does not apply to a rigid body",
+        ),
     ];
     refuses_each(TOP, &changes, |text| match BodyScene::read(text) {
         Err(error) => Some(error.to_string()),

@@ -265,7 +265,7 @@ fn bodies_are_checked() {
 #[test]
 fn torques_of_bodies() {
     let at = Directory::new("body_torque");
-    let text = "[body]\ninertia = [1.0, 2.0, 3.0]\ngamma = -0.1\ntorque = [\"0\", \"0\", \"-0.6*omega3\"]\n\
+    let text = "[system.body]\ninertia = [1.0, 2.0, 3.0]\ngamma = -0.1\ntorque = [\"0\", \"0\", \"-0.6*omega3\"]\n\
                 [start]\nomega = [0.0, 0.0, 2.0]\n[run]\ntime = 3.0\naccuracy = 1e-11\n[want]\nrows = { every = 1.0 }\n";
     let file = at.write("braked.toml", text);
     succeed(&["run", &file, "--out", &at.path("out")]);

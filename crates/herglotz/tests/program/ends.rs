@@ -104,12 +104,12 @@ fn wrong_scenes_of_paths_are_refused() {
             "x = 0.0\n\"x'\" = 1.0",
             "line 7, column 1: unknown name `x'` in the start of a path; the known names are x, z, t; did you mean `x`?",
         ),
-        ("steps = 40\n", "", "line 12, column 1: missing field `steps`; add it"),
+        ("steps = 40\n", "", "line 12, column 1: the run of a path has no `steps`, their number; add it"),
         ("steps = 40", "steps = 1", "line 13, column 9: `steps` is 1; it must be at least 2"),
         (
             "steps = 40",
             "accuracy = 1e-9",
-            "line 13, column 1: unknown name `accuracy`, expected `steps` or `integrator`",
+            "line 13, column 12: `accuracy` does not apply to a path between two ends; remove it",
         ),
         (
             "steps = 40",
@@ -122,7 +122,7 @@ fn wrong_scenes_of_paths_are_refused() {
         (
             "[run]",
             "[want]\nrows = { every = 0.1 }\n[run]",
-            "line 12, column 2: unknown name `want`, expected one of `version`,",
+            "line 13, column 8: `rows` does not apply to a path between two ends; remove it",
         ),
     ];
     refuses_each(OSCILLATOR, &changes, |text| {
@@ -138,8 +138,16 @@ fn wrong_scenes_of_paths_are_refused() {
             "{command}: {told}"
         );
     }
-    let (code, told) = fail(&["run", &file, "--set", "gamma=-0.1"]);
-    assert!(code == Some(2) && told.contains("--set"), "{told}");
+    let (code, told) = fail(&["run", &file, "--out", &at.path("out"), "--resume"]);
+    assert!(code == Some(2) && told.contains("--resume does not apply to a path"), "{told}");
+    // A value that is set is that of the file.
+    let of = |name: &str, arguments: &[&str]| {
+        succeed(&[["run"].as_slice(), arguments, &["--out", &at.path(name)]].concat());
+        at.read(&format!("{name}/rows.csv"))
+    };
+    let changed = at.write("changed.toml", &OSCILLATOR.replace("gamma = -0.2", "gamma = -0.1"));
+    assert_eq!(of("set", &[&file, "--set", "gamma=-0.1"]), of("changed", &[&changed]));
+    assert_ne!(of("set", &[&file, "--set", "gamma=-0.1"]), of("original", &[&file]));
     // A system of the catalogue has a default start, and arrays accept one number for all entries.
     let scene =
         EndsScene::read("[system]\ncatalogue = \"pendulum\"\n[ends]\ntheta = 0.5\nt = 2\n[run]\nsteps = 20\n").unwrap();

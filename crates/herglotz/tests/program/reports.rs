@@ -22,7 +22,7 @@ fn a_run_says_what_it_wrote() {
     scene_of("free_body", &["rows.csv", "polhode.svg"]);
     scene_of("chain", &["rows.csv"]);
     scene_of("lambert", &["rows.csv", "path.svg"]);
-    let text = "system = { coordinates = [\"x\"], lagrangian = \"x'^2/2 - x^2/2\" }\nversion = 1\n\
+    let text = "system = { coordinates = [\"x\"], lagrangian = \"x'^2/2 - x^2/2\" }\nversion = 2\n\
                 start = { x = 1.0, \"x'\" = 0.0 }\nrun = { time = 3.0, integrator = \"gauss_8\", step = 0.41 }\n";
     let file = at.write("scene.toml", text);
     let said = succeed(&["run", &file, "--out", &out]);
@@ -61,7 +61,7 @@ fn gains_of_energy_and_unused_tables() {
     let at = Directory::new("gains");
     let text = |gamma: &str| {
         format!(
-            "version = 1\nsystem = {{ coordinates = [\"x\"], lagrangian = \"x'^2/2 - x^2/2 + gamma*z\", parameters = {{ gamma = {gamma} }} }}\n\
+            "version = 2\nsystem = {{ coordinates = [\"x\"], lagrangian = \"x'^2/2 - x^2/2 + gamma*z\", parameters = {{ gamma = {gamma} }} }}\n\
              start = {{ x = 1.0, \"x'\" = 0.0 }}\nrun = {{ time = 1.0, accuracy = 1e-6 }}\n"
         )
     };

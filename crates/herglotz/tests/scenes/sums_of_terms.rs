@@ -104,3 +104,27 @@ fn what_is_wrong_is_said_at_its_place() {
         assert!(found.contains(expected), "{found:?} for {expected:?}");
     }
 }
+
+/// A start by a formula in the index of an array is that of its values, for arrays of a formula and the sites of a lattice.
+#[test]
+fn starts_by_formulas() {
+    let values: Vec<f64> = (0..4).map(|i| 0.1 * f64::from(i).sin() + 2.0 / 4.0).collect();
+    let starts = ["x = \"0.1*sin(i) + k/n\"".to_owned(), format!("x = {values:?}")];
+    let of = |text: &str| starts.each_ref().map(|start| end(&text.replace("x = [0.1, 0.3, 0.0, 0.2]", start)).q);
+    let (_, rest) = LATTICE.split_once("[start]").unwrap();
+    for text in [LATTICE.to_owned(), format!("{WRITTEN}[start]{rest}")] {
+        let [by_formula, by_values] = of(&text);
+        assert_eq!(by_formula, by_values);
+    }
+    // Velocities of a lattice default to 0, and single sites have names.
+    let without = LATTICE.replace("\"x'\" = 0.0\n", "");
+    assert!(without.len() < LATTICE.len() && end(&without).q == end(LATTICE).q);
+    let one_by_one =
+        LATTICE.replace("x = [0.1, 0.3, 0.0, 0.2]", "\"x[0]\" = 0.1\n\"x[1]\" = 0.3\n\"x[2]\" = 0.0\n\"x[3]\" = 0.2");
+    assert_eq!(end(&one_by_one).q, end(LATTICE).q);
+    let error =
+        |start: &str| Scene::read(&LATTICE.replace("[0.1, 0.3, 0.0, 0.2]", start)).map(|_| ()).unwrap_err().to_string();
+    assert!(error("\"sin(l)\"").contains("unknown name `l`"), "{}", error("\"sin(l)\""));
+    assert!(error("\"1/i\"").contains("`x` is inf at the entry 0"), "{}", error("\"1/i\""));
+    assert!(error("\"z\"").contains("can depend only on the index"), "{}", error("\"z\""));
+}

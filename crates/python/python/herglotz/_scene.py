@@ -12,17 +12,37 @@ from ._body import body
 from ._events import Event
 from ._path import path
 from ._solve import CATALOGUE, solve
-from ._sparse import bodies, lattice
+from ._sparse import _MOST_OF_FORMULA, bodies, lattice
 from ._system import system
 
 # The tables of a scene with their keys; those of `sweep` and `fit` are for other commands of the program.
 _KEYS = {
-    "system": "catalogue coordinates lagrangian hamiltonian momenta action constraints lattice bodies parameters",
+    "system": "catalogue coordinates lagrangian hamiltonian momenta action constraints lattice bodies body parameters",
     "run": "time accuracy integrator step steps project exact scales breaks",
     "want": "rows events wrap conformal_factor estimate",
-    "lattice": "sites boundary coordinates site bond parameters",
+}
+# Those of tables of the system.
+_KEYS_OF_SYSTEM = {
+    "lattice": "sites boundary site bond",
+    "bodies": "masses dimensions",
     "body": "inertia mass centre gravity gamma torque",
 }
+# What does not apply to a rigid body and to a path.
+_NOT_OF_BODIES = {
+    "": "ends force friction tables fit",
+    "system": "catalogue coordinates lagrangian hamiltonian momenta action constraints lattice bodies parameters",
+    "run": "project exact scales breaks",
+    "want": "wrap conformal_factor estimate",
+}
+_NOT_OF_PATHS = {
+    "": "friction tables sweep fit",
+    "system": "body",
+    "run": "time accuracy step project exact scales breaks",
+    "want": "rows events wrap conformal_factor estimate",
+}
+# The version of scene files, and the tables of version 1 that are tables of the system now.
+_VERSION = 2
+_MOVED = ("lattice", "body")
 _OF_ROWS = "every at every_step columns"
 _OF_EVENT = "when direction terminal from columns then impact rest"
 _TABLES = {*_KEYS, "version", "start", "ends", "force", "friction", "tables", "sweep", "fit"}
@@ -76,30 +96,41 @@ def run(scene, changes=None, *, progress=False, callback=None, callback_interval
     watch = dict(progress=progress, callback=callback, callback_interval=callback_interval)
     if "ends" in data:
         return _of_ends(data)
-    if "body" in data:
+    if "body" in data["system"]:
         return _of_body(data, watch)
-    if "lattice" in data:
-        return _of_lattice(data, watch)
     return _of_system(data, Path(scene).parent, watch)
 
 
 def _check(data):
     """Refuses tables and keys that a scene has not."""
+    version = data.get("version", _VERSION)
+    if version not in range(1, _VERSION + 1):
+        raise ValueError(f"the scene has version {version}; this package reads scenes up to version {_VERSION}")
     for name in data:
+        if name in _MOVED:
+            raise ValueError(f"[{name}] is [system.{name}] from version {_VERSION} of scene files on; the program translates a file by `herglotz migrate`")
         if name not in _TABLES:
             raise ValueError(f"unknown table `{name}`; a scene has {', '.join(sorted(_TABLES))}")
-    want = data.get("want", {})
+    want, of = data.get("want", {}), data.get("system", {})
     parts = [(f"[{name}]", keys, data.get(name, {})) for name, keys in _KEYS.items()]
+    parts += [(f"[system.{name}]", keys, of.get(name, {})) for name, keys in _KEYS_OF_SYSTEM.items()]
     parts += [("`rows`", _OF_ROWS, want.get("rows", {})), *(("an event", _OF_EVENT, event) for event in want.get("events", []))]
     for name, keys, found in parts:
         for key in found:
             if key not in keys.split():
                 raise ValueError(f"unknown name `{key}` in {name}, which has {', '.join(keys.split())}")
-    if not {"system", "lattice", "body"} & set(data):
-        raise ValueError("the scene has no [system]")
-    for name in ("start", "run"):
-        if name not in data and not (name == "start" and "catalogue" in data.get("system", {})):
+    for name in ("system", "start", "run"):
+        if name not in data and not (name == "start" and "catalogue" in of):
             raise ValueError(f"the scene has no [{name}]")
+    kind, others = ("a path between two ends", _NOT_OF_PATHS) if "ends" in data else ("a rigid body", _NOT_OF_BODIES)
+    if "ends" not in data and "body" not in of:
+        kind, others = "a motion", {}
+    for table, keys in others.items():
+        for key in keys.split():
+            if (data.get(table, {}) if table else data).get(key):
+                raise ValueError(f"`{key}` does not apply to {kind}; remove it")
+    if "ends" not in data and "time" not in data["run"]:
+        raise ValueError("[run] has no `time`; add it")
 
 
 def _change(data, name, value):
@@ -115,9 +146,9 @@ def _change(data, name, value):
     if part:
         data.setdefault(part, {})[key] = value
         return
-    of = data.get("body", data.get("system", data.get("lattice")))
-    parameters = of if "body" in data else of.setdefault("parameters", {})
-    known = [*(_KEYS["body"].split() if "body" in data else parameters)]
+    of = data["system"]
+    parameters = of["body"] if "body" in of else of.setdefault("parameters", {})
+    known = [*(_KEYS_OF_SYSTEM["body"].split() if "body" in of else parameters)]
     if "catalogue" in of:
         known += [name for name, _ in CATALOGUE.get(of["catalogue"], [()] * 5)[4]]
     if "bodies" in of:
@@ -173,6 +204,8 @@ def _system_of(data, tables=None):
 
 def _start_of(start, L, given):
     """The arguments of `solve` for a start."""
+    if "lattice" in given:
+        return _start_of_lattice(start, given)
     of = L if isinstance(L, _core.System) else L.system
     names = of.coordinates
     kinds = {
@@ -190,6 +223,8 @@ def _start_of(start, L, given):
             # An array has a list, or one number for all its entries.
             places = [i for i, other in enumerate(all_names) if other == name or other.partition("[")[0] == name and "[" in other]
             if places:
+                if isinstance(value, str):
+                    value = _profile(value, (len(places),), given.get("parameters", {})).tolist()
                 for i, x in zip(places, value if isinstance(value, list) else [value] * len(places), strict=True):
                     values[kind][i] = float(x)
                 break
@@ -229,7 +264,7 @@ def _of_system(data, folder, watch):
         **_way(run),
         **{name: run[name] for name in ("project", "exact", "scales", "breaks") if name in run},
         **additions,
-        events=[_event(event) for event in want.get("events", [])],
+        events=[_event(event) for event in want.get("events", [])] or (),
         observe=observe or None,
         conformal_factor=conformal,
         estimate=want.get("estimate", False),
@@ -247,6 +282,8 @@ def _name(column):
 
 def _names(L):
     """The columns that a solution has by itself."""
+    if not isinstance(L, _core.System) and L.dimension > _MOST_OF_FORMULA:
+        return []
     of = L if isinstance(L, _core.System) else L.system
     return [*of.coordinates, *_core.velocity_names(of.given_coordinates)[1]]
 
@@ -273,7 +310,7 @@ def _of_ends(data):
     t0, start = _start_of(data.get("start", {}), L, data["system"])
     ends = dict(data["ends"])
     t1 = ends.pop("t")
-    _, end = _start_of(ends, L, {})
+    _, end = _start_of(ends, L, {name: x for name, x in data["system"].items() if name != "catalogue"})
     force = dict(data.get("force", {}))
     rayleigh = force.pop("rayleigh", None)
     run = {name: data["run"][name] for name in ("steps", "integrator") if name in data["run"]}
@@ -285,26 +322,38 @@ def _of_body(data, watch):
     t0 = start.pop("t", 0.0)
     given = dict(q0=start.get("attitude"), v0=start["omega"], z0=start.get("z", 0.0))
     events = [Event(event["when"], event.get("direction", "both"), event.get("terminal", False)) for event in data.get("want", {}).get("events", [])]
-    return solve(body(**data["body"]), **given, **_times(data, t0), **_way(data["run"]), events=events, **watch)
+    return solve(body(**data["system"]["body"]), **given, **_times(data, t0), **_way(data["run"]), events=events, **watch)
 
 
-def _of_lattice(data, watch):
-    of, start = dict(data["lattice"]), dict(data["start"])
-    sizes = tuple(np.atleast_1d(of.pop("sites")))
-    names = of.get("coordinates", ["x"])
-    t0, z0 = start.pop("t", 0.0), start.pop("z", 0.0)
-    values = {name: _profile(x, sizes, of.get("parameters", {})) for name, x in start.items()}
-    zero = np.zeros(sizes)
-    velocities = _core.velocity_names(names)[1]
-    momenta = [f"p_{name}" for name in names]
-    for name in values:
-        if name not in (*names, *velocities, *momenta):
+def _start_of_lattice(start, given):
+    """The same for a lattice: components of all sites, or numbers at single sites. Velocities are 0 where they are not given."""
+    names, sizes = given.get("coordinates", ["x"]), tuple(np.atleast_1d(given["lattice"]["sites"]))
+    sites, several = int(np.prod(sizes)), len(names) > 1
+    kinds = {"q0": names, "v0": _core.velocity_names(names)[1], "p0": [f"p_{name}" for name in names]}
+    values = {kind: np.full((sites, len(names)), np.nan) for kind in kinds}
+    others = {"t": 0.0, "z": 0.0}
+    for name, value in start.items():
+        if name in others:
+            others[name] = value
+            continue
+        for kind, components in kinds.items():
+            if name in components:
+                values[kind][:, components.index(name)] = np.ravel(_profile(value, sizes, given.get("parameters", {})))
+                break
+            # As in `x[3]`, `x'[3]`, or with several components `x_3` and `x_3'`.
+            found = re.fullmatch(r"(\w+)_(\d+)('?)" if several else r"(\w+'?)\[(\d+)\]()", name)
+            if found and found[1] + found[3] in components and int(found[2]) < sites:
+                values[kind][int(found[2]), components.index(found[1] + found[3])] = value
+                break
+        else:
             raise ValueError(f"unknown name `{name}` in [start]; the coordinates at a site are {', '.join(names)}")
-    by_momentum = any(name in values for name in momenta)
-    rates = [values.get(name, zero) for name in (momenta if by_momentum else velocities)]
-    arrays = [np.stack(x, axis=-1) if len(names) > 1 else x[0] for x in ([values[name] for name in names], rates)]
-    given = dict(zip(("q0", "p0" if by_momentum else "v0"), arrays))
-    return lattice(**of, **given, **_times(data, t0), **_way(data["run"]), z0=z0, **watch)
+    if np.isnan(values["p0"]).all():
+        values["v0"] = np.nan_to_num(values["v0"])
+    chosen = {kind: x.ravel() for kind, x in values.items() if kind == "q0" or not np.isnan(x).all()}
+    for kind, x in chosen.items():
+        if np.isnan(x).any():
+            raise ValueError(f"[start] has no `{kinds[kind][np.flatnonzero(np.isnan(x))[0] % len(names)]}` at some sites; add it")
+    return others["t"], chosen | {"z0": others["z"]}
 
 
 def _profile(of, sizes, parameters):
@@ -315,6 +364,7 @@ def _profile(of, sizes, parameters):
     *definitions, value = re.split(r"[;\n]", of.strip().rstrip(";"))
     # Where all velocities are 0 the value of this Lagrangian is that of the formula.
     text = "; ".join([*definitions, " + ".join([*(f"{name}'^2/2" for name in names), f"({value})"])])
-    formula = system(text, coordinates=list(names), parameters={"n": float(np.prod(sizes))} | parameters)
+    known = {name: x for name, x in parameters.items() if name not in names}
+    formula = system(text, coordinates=list(names), parameters={"n": float(np.prod(sizes))} | known)
     at = lambda index: _core.geometry(formula, (0.0, [*map(float, index)], [0.0] * len(names), 0.0))["lagrangian"]
     return np.array([at(index) for index in np.ndindex(*sizes)]).reshape(sizes)

@@ -74,7 +74,11 @@ class SparseSystem(Composed):
                 arguments[name] = np.broadcast_to(x, self.dimension) if np.ndim(arguments[name]) == 0 else x.ravel()
         asked = {name: x for name, x in arguments.items() if name in _OF_RUN and name != "L"}
         others = {name for name, x in arguments.items() if name not in _OF_RUN and not is_absent(x)}
-        if self.dimension > _FEW and not others and isinstance(asked["integrator"], str) and (asked["step"], asked["steps"]) != (None, None):
+        has_steps = isinstance(asked["integrator"], str) and (asked["step"], asked["steps"]) != (None, None)
+        # Gauss methods of more stages are those of the formula.
+        stages = re.fullmatch(r"gauss_(\d+)", asked["integrator"]) if has_steps else None
+        is_formula = stages is not None and int(stages[1]) > 2 and self.dimension <= _MOST_OF_FORMULA
+        if self.dimension > _FEW and not others and has_steps and not is_formula:
             watch = Watch(*(asked.pop(name) for name in ("progress", "callback", "callback_interval")))
             return of._solution(**asked, watch=watch)
         return solve(**arguments | {"L": of.system})
