@@ -92,13 +92,9 @@ impl Samples {
         self.values().iter().all(|value| value.is_finite())
     }
 
-    /// Replaces the values at nodes, chosen by their fractions of the interval.
-    pub fn replace(&mut self, value: f64, mut at: impl FnMut(f64) -> bool) {
-        for (j, slot) in self.values[..=self.degree].iter_mut().enumerate() {
-            if at(node(self.degree, j)) {
-                *slot = value;
-            }
-        }
+    /// Replaces the value at the start of the interval.
+    pub fn set_start(&mut self, value: f64) {
+        self.values[0] = value;
     }
 
     /// Replaces the value at the end of the interval.

@@ -3,6 +3,7 @@
 use crate::gauss::StepStart;
 use crate::integration::{hermite, state_at};
 use crate::switching::local_motion::{phase_point, rates_along_motion};
+use crate::switching::stepper::parts::time_spacing;
 use crate::{DenseStep, Point, State, System, Vector};
 
 /// The number of equal parts in which a curve without dense output is searched for jumps.
@@ -15,6 +16,10 @@ const DEFAULT_DEGREE: usize = 7;
 /// The largest number of stages with which the cubic Hermite polynomial, of order 4, is used in place of the
 /// collocation polynomial, whose order between the ends of the step is the number of stages.
 const MAX_HERMITE_STAGES: usize = 2;
+
+/// The length of a step, in units of the round-off of its time, up to which the nodes of an interpolant may have the same
+/// rounded times.
+const SHORT: f64 = 16.0;
 
 /// A time and a state of the motion, with its velocity.
 #[derive(Clone, Debug)]
@@ -107,19 +112,22 @@ impl StepCurve {
         self.to.t - self.from.t
     }
 
-    /// The time at a fraction of the step.
-    pub(super) fn time(&self, fraction: f64) -> f64 {
-        if fraction == 1.0 { self.to.t } else { self.from.t + fraction * self.span() }
+    /// The fraction of the time at a fraction of the step, which is rounded. A surface that moves is where it is at this time,
+    /// and so must be the point: otherwise a function changes its sign by the rounding of a time. On a step of few rounded
+    /// times the motion is round-off, and the fraction is kept.
+    pub(super) fn rounded(&self, fraction: f64) -> f64 {
+        let t = self.from.t + fraction * self.span();
+        let is_short = self.span().abs() <= SHORT * time_spacing(self.to.t, self.span());
+        if is_short { fraction } else { (t - self.from.t) / self.span() }
     }
 
     /// The time and the point, for switching functions, at a fraction of the step.
     pub(super) fn at(&self, fraction: f64) -> (f64, Point) {
-        let t = self.time(fraction);
-        if t == self.to.t {
-            return (t, if self.is_hamiltonian { phase_point(&self.to.state) } else { self.to.point() });
+        let fraction = self.rounded(fraction);
+        if fraction == 1.0 {
+            return (self.to.t, if self.is_hamiltonian { phase_point(&self.to.state) } else { self.to.point() });
         }
-        // The fraction of the rounded time: a surface that moves is where it is at this time, and so must be the point.
-        let fraction = (t - self.from.t) / self.span();
+        let t = self.from.t + fraction * self.span();
         let x = match self.collocation() {
             Some(dense) if self.is_hamiltonian => phase_point(&dense.at_fraction(fraction)),
             Some(dense) => {

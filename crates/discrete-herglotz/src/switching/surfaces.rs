@@ -6,7 +6,6 @@ use crate::solve::sign_changes::{Scale, Separation, has_no_zero, separate};
 use crate::switching::departure::{DEPARTURE, Departure};
 use crate::switching::local_motion::rates_along_motion;
 use crate::switching::step_curve::{StepCurve, TimedState};
-use crate::switching::stepper::parts::time_spacing;
 use crate::system::AtSwitch;
 use crate::{InputError, Point, StepError, System, Vector};
 use std::convert::Infallible;
@@ -295,12 +294,12 @@ impl Surfaces {
             }
             if side * samples.ends()[0] < 0.0 {
                 // The motion starts on the surface, beyond it by round-off.
-                samples.replace(0.0, |fraction| curve.time(fraction) == curve.from.t);
+                samples.set_start(0.0);
             }
             if let Some(h) = ends_on_zeros
                 && self.is_on(system, index, (curve.to.t, &curve.to.argument(system)), h)
             {
-                samples.replace(0.0, |fraction| curve.time(fraction) == curve.to.t);
+                samples.set_end(0.0);
             }
             if let Some(j) = samples.values().iter().position(|value| value.is_nan())
                 && [true, false]
@@ -363,11 +362,12 @@ impl Surfaces {
     ) -> (Option<(f64, f64)>, Option<[f64; 2]>) {
         let size = samples.size();
         let (mut points, scale) = (Vec::new(), Scale { size, near: 0.0, noise: ROUND_OFF * size });
-        let [at_start, at_end] = samples.ends();
-        let along = |fraction: f64| match curve.at(fraction) {
-            (t, _) if t == curve.from.t => at_start,
-            (t, _) if t == curve.to.t => at_end,
-            (t, x) => self.value(system, index, (t, &x)),
+        let along = |fraction: f64| {
+            if fraction == 1.0 {
+                return samples.ends()[1];
+            }
+            let (t, x) = curve.at(fraction);
+            self.value(system, index, (t, &x))
         };
         let reached = match separate(samples, scale, along, &mut points) {
             Separation::Complete => 1.0,
@@ -399,11 +399,10 @@ impl Surfaces {
         [mut from, to]: [f64; 2],
     ) -> SignChange {
         let side = self.side(index);
-        let timed = |surfaces: &mut Self, fraction: f64| {
+        let toward = |surfaces: &mut Self, fraction: f64| {
             let (t, x) = curve.at(fraction);
-            (t, side * surfaces.value(system, index, (t, &x)))
+            side * surfaces.value(system, index, (t, &x))
         };
-        let toward = |surfaces: &mut Self, fraction: f64| timed(surfaces, fraction).1;
         let (mut before, after) = (toward(self, from), toward(self, to));
         if before.is_nan() || before <= 0.0 {
             // The part begins at a zero: find a point where the function still has the sign of its side, and not by
@@ -418,12 +417,9 @@ impl Surfaces {
         }
         let found = bracketed_root([from, to], [before, after], |x| Ok::<_, Infallible>(toward(self, x)));
         let estimate = found.unwrap_or(from);
-        // Two times that are not the same after rounding.
-        let apart = time_spacing(curve.to.t, curve.span()) / curve.span().abs();
-        let distance = (SLOPE_DISTANCE * (to - from)).max(apart);
-        let [(t_before, before), (t_after, after)] =
-            [estimate - distance, estimate + distance].map(|fraction| timed(self, fraction));
-        let slope = (after - before) / (t_after - t_before);
+        let distance = SLOPE_DISTANCE * (to - from);
+        let [left, right] = [estimate - distance, estimate + distance].map(|fraction| curve.rounded(fraction));
+        let slope = (toward(self, right) - toward(self, left)) / ((right - left) * curve.span());
         SignChange { index, ends: [from, to], estimate, slope: side * slope }
     }
 }
