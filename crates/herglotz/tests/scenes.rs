@@ -8,6 +8,8 @@ mod additions;
 mod constraints;
 #[path = "../../formula-lagrangian/tests/random/mod.rs"]
 mod random;
+#[path = "scenes/reference.rs"]
+mod reference;
 #[path = "scenes/sums_of_terms.rs"]
 mod sums_of_terms;
 #[path = "scenes/where_z_bites.rs"]
