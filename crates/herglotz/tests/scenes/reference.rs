@@ -152,11 +152,11 @@ struct Reference<'s> {
 impl Reference<'_> {
     /// The shortest value of a key in any scene.
     fn example(&mut self, path: &[&str]) -> String {
-        let (key, of_table) = (path[path.len() - 1], &path[..]);
+        let key = path[path.len() - 1];
         let mut found: Vec<(String, Option<String>)> = Vec::new();
         for (name, table) in &self.examples {
             let table = toml::Value::Table(table.clone());
-            found.extend(values(&table, of_table).iter().map(|value| (inline(value), name.clone())));
+            found.extend(values(&table, path).iter().map(|value| (inline(value), name.clone())));
         }
         found.sort_by_key(|(text, name)| (text.len(), name.is_none(), text.clone(), name.clone()));
         let Some((text, name)) = found.into_iter().next() else {
