@@ -2,9 +2,12 @@
 
 import ast
 import inspect
+import subprocess
+import sys
 from pathlib import Path
 
 import herglotz as hz
+import pytest
 
 STUBS = ast.parse(Path(hz.__file__).with_name("__init__.pyi").read_text())
 
@@ -16,6 +19,18 @@ def test_every_public_name_has_a_stub_and_a_docstring():
     assert named - set(hz.__all__) <= {"Place", "Work"}
     for name in hz.__all__:
         assert inspect.getdoc(getattr(hz, name)), name
+
+
+def test_the_reference_has_every_public_name(tmp_path):
+    pytest.importorskip("pdoc")
+    command = [sys.executable, "-m", "pdoc", "--docformat", "numpy", "-o", str(tmp_path), "herglotz"]
+    subprocess.run(command, check=True, capture_output=True)
+    page = (tmp_path / "herglotz.html").read_text()
+    for name in hz.__all__:
+        assert f'id="{name}"' in page, name
+    # The parameters of a function are a list, and formulas keep their stars.
+    assert "The number of sites along each direction of the lattice" in page
+    assert "<code>m*x'^2/2 - V(t, x) + gamma*z</code>" in page
 
 
 def test_functions_have_the_arguments_of_their_stubs():

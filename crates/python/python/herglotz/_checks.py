@@ -131,7 +131,7 @@ def is_contact(map, at, *, tolerance=1e-9):
     Returns
     -------
     Contact
-        True or false, the conformal factor sigma, and the largest component of F*eta - sigma eta, relative to F*eta.
+        True or false, the conformal factor sigma, and the largest component of ``F*eta - sigma eta``, relative to ``F*eta``.
         A map with sigma = 0 is not contact.
     """
     try:

@@ -286,7 +286,7 @@ def lattice(
     Parameters
     ----------
     site : str
-        The Lagrangian of a site, of the form m*x'^2/2 - V(t, x) + gamma*z: ``"x'^2/2 - (1 - cos(x)) + gamma*z"``.
+        The Lagrangian of a site, of the form ``m*x'^2/2 - V(t, x) + gamma*z``: ``"x'^2/2 - (1 - cos(x)) + gamma*z"``.
     bond : str, optional
         The Lagrangian of a bond, in the coordinates before and after it, without velocities: ``"-k*(xr - xl)^2/2"``.
     q0, v0 : array of shape (sites,), (sites, sites) and so on
