@@ -12,6 +12,8 @@ mod ends;
 mod events;
 #[path = "program/fit.rs"]
 mod fit;
+#[path = "program/kinds.rs"]
+mod kinds;
 #[path = "program/reports.rs"]
 mod reports;
 #[path = "program/support.rs"]

@@ -70,11 +70,20 @@ impl EndsScene {
         let formula = with_forces(text, formula(text, table, entry, &[])?, file.force.as_ref())?;
         let formula = with_constraints(text, formula, table.constraints.as_ref())?;
         check_used(text, &formula, table, &[])?;
-        let system_at = table.lagrangian.as_ref().map_or(table.span(), Location::span);
+        let source = table.lagrangian.as_ref().or(table.hamiltonian.as_ref());
+        let system_at = source.map_or(table.span(), Location::span);
         let system = System::new(&formula).map_err(|error| super::output::of_formula(text, system_at, &error))?;
         let start_at = start.as_ref().map_or(table.span(), Location::span);
         let lattice = sum_of_terms::lattice(table);
         let of_system = (&formula, lattice.as_ref());
+        // Before an integrator is refused for what no integrator can do.
+        let what = "paths between two positions";
+        if formula.is_hamiltonian() {
+            return Err(SceneError::at(text, system_at, RuntimeError::OfLagrangians { what }.to_string()));
+        }
+        if let Some(constraints) = &table.constraints {
+            return Err(SceneError::at(text, constraints.span(), RuntimeError::WithConstraints { what }.to_string()));
+        }
         let given = Ends::read(text, of_system, (start.as_deref(), start_at), (ends, ends.span()), entry)?;
         let by = match &run.integrator {
             Some(name) => integrator(text, name)?,
