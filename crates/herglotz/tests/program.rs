@@ -584,6 +584,11 @@ fn old_scenes_are_translated() {
     assert_eq!(succeed(&["migrate", &file]), new);
     let body = "[body]\ninertia = [1.0, 2.0, 3.0]\n[start]\nomega = [1.0, 0.0, 0.0]\n";
     assert_eq!(succeed(&["migrate", &at.write("body.toml", body)]), body.replace("[body]", "[system.body]"));
+    // Nothing is lost of a file that is of no version.
+    let both = at.write("both.toml", &format!("{body}[system]\ncatalogue = \"pendulum\"\n"));
+    let (code, said) = fail(&["migrate", &both, "--in-place"]);
+    assert!(code == Some(2) && said.contains("the scene has [system] and [body]"), "{said}");
+    assert!(at.read("both.toml").contains("pendulum"));
     let (code, said) = fail(&["migrate", &at.write("bad.toml", "version = \n")]);
     assert!(code == Some(2) && said.contains("bad.toml, line 1"), "{said}");
 }

@@ -48,7 +48,13 @@ fn with_header(item: Item) -> Option<Table> {
 fn translated(text: &str) -> Result<String, SceneError> {
     let mut document: DocumentMut =
         text.parse().map_err(|error: toml_edit::TomlError| SceneError::of_text(text, error.span(), error.message()))?;
+    let has_system = document.contains_key("system");
     for name in MOVED {
+        // A file with both is of no version, and nothing of it may be lost.
+        if let (true, Some((key, _))) = (has_system, document.get_key_value(name)) {
+            let why = format!("the scene has [system] and [{name}]; remove one of them");
+            return Err(SceneError::of_text(text, key.span(), &why));
+        }
         let Some(mut table) = document.remove(name).and_then(with_header) else { continue };
         let position = table.position();
         let mut system = Table::new();

@@ -6,7 +6,7 @@ use super::checked::finite;
 use super::combinations::Combinations;
 use super::file::{self, DirectionName, EventTable, File, RowsTable};
 use super::location::{Location, Named, Numbers, Span};
-use super::only::{refuse_all, set};
+use super::only::{refuse_all, set, span};
 use super::output::{RowTimes, of_formula};
 use super::step_control::step_control;
 use super::sweep::{self, Slot, SweptQuantity};
@@ -176,9 +176,6 @@ fn of_table(text: &str, table: &BodyTable) -> Result<Body, SceneError> {
 
 /// The keys that rigid bodies do not have, with their positions.
 fn not_of_bodies(file: &File) -> Vec<(Option<Span>, &'static str)> {
-    fn span<T>(key: &Option<Location<T>>) -> Option<Span> {
-        key.as_ref().map(Location::span)
-    }
     let (system, want) = (&*file.system, &file.want);
     let mut keys = vec![
         (span(&system.catalogue), "catalogue"),

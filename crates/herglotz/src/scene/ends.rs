@@ -5,7 +5,7 @@ use super::constraints::with_constraints;
 use super::file::{self, File, RunTable};
 use super::forces::with_forces;
 use super::location::{Location, Span};
-use super::only::{refuse_all, set};
+use super::only::{refuse_all, set, span};
 use super::start::Ends;
 use super::step_control::integrator;
 use super::sum_of_terms;
@@ -151,9 +151,6 @@ impl EndsScene {
 
 /// The keys that paths do not have, with their positions.
 fn not_of_paths(file: &File) -> Vec<(Option<Span>, &'static str)> {
-    fn span<T>(key: &Option<Location<T>>) -> Option<Span> {
-        key.as_ref().map(Location::span)
-    }
     let (run, want) = (&*file.run, &file.want);
     vec![
         (file.friction.0.first().map(|(name, _)| name.span()), "friction"),

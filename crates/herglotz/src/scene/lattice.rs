@@ -5,7 +5,7 @@ use super::checked::finite;
 use super::file;
 use super::file::{File, RunTable, WantTable};
 use super::location::{Location, Span};
-use super::only::{refuse_all, set};
+use super::only::{refuse_all, set, span};
 use super::output::RowTimes;
 use super::start::{self, StartNames};
 use super::step_control::step_control;
@@ -63,13 +63,13 @@ fn of_formulas(file: &File) -> Vec<(Option<Span>, &'static str)> {
         (want.wrap.first().map(Location::span), "wrap"),
         (set(&want.conformal_factor), "conformal_factor"),
         (set(&want.estimate), "estimate"),
-        (file.force.as_ref().map(Location::span), "force"),
+        (span(&file.force), "force"),
         (file.friction.0.first().map(|(name, _)| name.span()), "friction"),
         (file.tables.0.first().map(|(name, _)| name.span()), "tables"),
-        (system.constraints.as_ref().map(Location::span), "constraints"),
-        (run.accuracy.as_ref().map(Location::span), "accuracy"),
-        (run.scales.as_ref().map(Location::span), "scales"),
-        (run.breaks.as_ref().map(Location::span), "breaks"),
+        (span(&system.constraints), "constraints"),
+        (span(&run.accuracy), "accuracy"),
+        (span(&run.scales), "scales"),
+        (span(&run.breaks), "breaks"),
         (set(&run.project), "project"),
         (set(&run.exact), "exact"),
     ]

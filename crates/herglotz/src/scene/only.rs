@@ -3,6 +3,11 @@
 use super::SceneError;
 use super::location::{Location, Span};
 
+/// The position of a key that is given.
+pub(super) fn span<T>(key: &Option<Location<T>>) -> Option<Span> {
+    key.as_ref().map(Location::span)
+}
+
 /// The position of a switch that is on.
 pub(super) fn set(switch: &Option<Location<bool>>) -> Option<Span> {
     switch.as_ref().filter(|on| ***on).map(Location::span)

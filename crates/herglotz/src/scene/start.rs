@@ -129,17 +129,11 @@ fn keys(names: &StartNames<'_>) -> Vec<Key> {
         }
     }
     if let Some((components, sizes)) = names.lattice {
-        let each = |c: usize, name: String, part: Part| Key {
-            name,
-            part,
-            first: c,
-            stride: components.len(),
-            sizes: Some(sizes.to_vec()),
-        };
         for (c, x) in components.iter().enumerate() {
-            keys.push(each(c, x.clone(), Part::Position));
-            keys.push(each(c, velocity_name(x), Part::Velocity));
-            keys.push(each(c, format!("p_{x}"), Part::Momentum));
+            keys.extend(names_of(x).map(|(name, part)| {
+                let (stride, sizes) = (components.len(), Some(sizes.to_vec()));
+                Key { name, part, first: c, stride, sizes }
+            }));
         }
     }
     keys.extend(

@@ -138,8 +138,8 @@ fn wrong_scenes_of_paths_are_refused() {
             "{command}: {told}"
         );
     }
-    let (code, told) = fail(&["run", &file, "--out", &at.path("out"), "--resume"]);
-    assert!(code == Some(2) && told.contains("--resume does not apply to a path"), "{told}");
+    let (code, message) = fail(&["run", &file, "--out", &at.path("out"), "--resume"]);
+    assert!(code == Some(2) && message.contains("--resume does not apply to a path"), "{message}");
     // A value that is set is that of the file.
     let of = |name: &str, arguments: &[&str]| {
         succeed(&[["run"].as_slice(), arguments, &["--out", &at.path(name)]].concat());
