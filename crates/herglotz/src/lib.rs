@@ -11,6 +11,6 @@ mod scene;
 #[doc(no_inline)]
 pub use herglotz_runtime as runtime;
 pub use scene::{
-    AnyScene, BodyScene, Combinations, EndsScene, LatticeScene, Members, Scene, SceneError, SweptQuantity, VERSION,
-    schema,
+    AnyScene, BodyScene, Combinations, EndsScene, LatticeScene, Members, Property, Scene, SceneError, SweptQuantity,
+    VERSION, schema,
 };

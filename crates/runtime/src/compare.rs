@@ -125,6 +125,10 @@ impl System {
         peers: &[&dyn Peer],
         progress: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Comparison, RuntimeError> {
+        if cfg!(target_family = "wasm") {
+            // There is no clock.
+            return Err(RuntimeError::NotCompiled { what: "measured run times" });
+        }
         let is_held = self.formula().constraints() > 0;
         let without_output = |step_control: StepControl| Motion {
             action: false,

@@ -55,6 +55,12 @@ pub enum RuntimeError {
         /// Its value.
         value: f64,
     },
+    /// What was requested is not compiled without the feature `full`.
+    #[error("{what} are not part of this build; use one with the feature `full` of herglotz-runtime")]
+    NotCompiled {
+        /// What is left out.
+        what: &'static str,
+    },
     /// A formula with many coordinates was used where kernels are compiled for few.
     #[error(
         "a formula with more than {most} coordinates has no {what}: it runs by contact Gauss collocation; use a lattice or bodies for sums of local terms"

@@ -7,6 +7,9 @@
 //! between two ends. [`Lattice`], given by the formulas of a site and of a bond, and [`Bodies`] have more coordinates. [`Body`] is a
 //! rigid body about a fixed point.
 //!
+//! Without the feature `full` (default) a program is a third of the size: it has formulas in 1 to 8 coordinates, of which some have additional ones at rest, and
+//! neither derivatives, ensembles nor the theorems of a check, which are refused by [`RuntimeError::NotCompiled`].
+//!
 //! ```
 //! use herglotz_runtime::{Column, Motion, Start, System, StepControl, OutputTimes};
 //!
@@ -25,11 +28,13 @@ mod body;
 mod body_resume_state;
 mod catalogue;
 mod check;
+mod clock;
 mod column;
 mod compare;
 mod ensemble;
 mod error;
 mod fit;
+mod full;
 mod geometry;
 mod interrupt;
 mod kernel;

@@ -166,6 +166,22 @@ impl System {
         self.kernel.hamiltonian_geometry(at)
     }
 
+    /// The velocity of the motion at a time and a point, for integrators of one's own: `(q', v', z')` at `y = (q, v, z)`, for a
+    /// Hamiltonian `(q', p', z')` at `y = (q, p, z)`, without resets and constraints. NaN where it is not defined, or where `y`
+    /// or `to` has another length.
+    ///
+    /// ```
+    /// let system = herglotz_runtime::System::parse("x'^2/2 - x^2/2 - z/10", &["x"], &[])?;
+    /// let mut rates = [0.0; 3];
+    /// system.rates(0.0, &[1.0, 2.0, 0.0], &mut rates);
+    /// assert_eq!(rates, [2.0, -1.2, 1.5]);
+    /// # Ok::<(), herglotz_runtime::RuntimeError>(())
+    /// ```
+    pub fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
+        let length = 2 * self.dimension() + 1;
+        if [y.len(), to.len()] == [length; 2] { self.kernel.rates(t, y, to) } else { to.fill(f64::NAN) }
+    }
+
     /// Checks at this number of samples of a motion whether its steps are contact transformations.
     ///
     /// # Errors

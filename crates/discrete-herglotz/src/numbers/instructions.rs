@@ -43,9 +43,9 @@ macro_rules! either {
 /// The module for a build with a single instruction set.
 #[allow(unused_macros)] // Not used in builds that select the instruction set at run time.
 macro_rules! only {
-    ($set:ident) => {
+    ($of:ident :: $set:ident) => {
         mod chosen {
-            use pulp::{Simd, WithSimd, x86::$set};
+            use pulp::{Simd, WithSimd, $of::$set};
 
             pub type Set = $set;
 
@@ -86,22 +86,25 @@ either! {
             target_feature = "avx512cd",
             target_feature = "avx512dq",
             target_feature = "avx512vl"
-        ) => only! { V4 }
-        otherwise only! { V3 }
+        ) => only! { x86::V4 }
+        otherwise only! { x86::V3 }
     }
-    otherwise mod chosen {
-        use pulp::{Arch, WithSimd};
+    otherwise either! {
+        all(not(test), target_arch = "wasm32", target_feature = "simd128") => only! { wasm::Simd128 }
+        otherwise mod chosen {
+            use pulp::{Arch, WithSimd};
 
-        pub type Set = Arch;
+            pub type Set = Arch;
 
-        #[inline]
-        pub fn set() -> Set {
-            Arch::new()
-        }
+            #[inline]
+            pub fn set() -> Set {
+                Arch::new()
+            }
 
-        #[inline(always)]
-        pub fn run<K: WithSimd>(set: Set, kernel: K) -> K::Output {
-            set.dispatch(kernel)
+            #[inline(always)]
+            pub fn run<K: WithSimd>(set: Set, kernel: K) -> K::Output {
+                set.dispatch(kernel)
+            }
         }
     }
 }

@@ -1,6 +1,5 @@
 //! `herglotz check`.
 
-use super::plan::momentum;
 use super::scene_arguments::{FormulaOrBody, SceneArguments};
 use crate::failure::Failure;
 use crate::output::{json, print, print_json, short, table};
@@ -46,8 +45,7 @@ impl Check {
         let is_hamiltonian = scene.system.hamiltonian_structure().is_some();
         let field = is_hamiltonian.then(|| scene.system.hamiltonian_geometry(&scene.bare_motion().start));
         let field = field.transpose().map_err(|error| self.scene.explain(scene.explain(&error)))?;
-        let momenta: Vec<String> =
-            scene.system.symmetries().iter().map(|symmetry| momentum(&scene, symmetry)).collect();
+        let momenta: Vec<String> = scene.momenta();
         if self.json {
             let mut value = of_json(&check, &momenta);
             if let Some(found) = &lyapunov {

@@ -23,6 +23,7 @@ mod only;
 mod output;
 mod overrides;
 mod profile;
+mod property;
 mod quantities;
 mod resets;
 mod start;
@@ -41,6 +42,7 @@ pub use file::VERSION;
 pub use lattice::LatticeScene;
 pub use members::Members;
 pub use motion::Scene;
+pub use property::Property;
 pub use sweep::SweptQuantity;
 
 /// The JSON schema of scene files.

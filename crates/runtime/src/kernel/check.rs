@@ -1,11 +1,12 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
 use super::Kernel;
-use super::discrete::{custom, of_lagrangians};
+use super::discrete::{custom, has_custom, no_custom};
 use super::formula_system::FormulaSystem;
 use super::many::{ManyCoordinates, few, gauss};
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
+use crate::full::FULL;
 use crate::{
     Check, FormulaMethod, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual,
     StepControl,
@@ -82,8 +83,8 @@ fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
         MapBy::Named(by) => *by,
         MapBy::Method(method) => {
             // Written so that it is not compiled for Hamiltonians.
-            if const { L::HINTS.hamiltonian } {
-                return Err(of_lagrangians());
+            if const { !has_custom::<L, N>() } {
+                return Err(no_custom());
             } else {
                 return Ok(problem.by(custom(method, problem.lagrangian())?).steps(Steps::Count(count)));
             }
@@ -336,7 +337,7 @@ pub(super) fn check<const N: usize>(
 ) -> Result<Check, RuntimeError> {
     let (mut check, states, collocation) = along(system, motion, samples)?;
     let (lagrangian, formula) = (&system.0, system.0.formula());
-    if formula.constraints() > 0 {
+    if const { !FULL } || formula.constraints() > 0 {
         // The theorems are about discrete Lagrangians on Q x Q x R.
         return Ok(check);
     }

@@ -1,6 +1,7 @@
 //! The discrete Lagrangian of a formula, for a number of coordinates that is known at compile time.
 
 use super::formula_system::FormulaSystem;
+use crate::full::{FULL, not_compiled};
 use crate::{FormulaMethod, RuntimeError};
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::{Arguments, DiscreteJet, DiscretePoint, Scalar, ScalarSystem, SecondDiscreteJet, Slopes};
@@ -45,9 +46,15 @@ pub(super) fn custom<L: FormulaSystem<N>, const N: usize>(
     Ok(if of.symmetric { custom.symmetric() } else { custom })
 }
 
-/// The error for a Hamiltonian, which has no discrete Lagrangian.
-pub(super) fn of_lagrangians() -> RuntimeError {
-    RuntimeError::OfLagrangians { what: "discrete Lagrangians" }
+/// Whether methods of one's own are compiled for a system: not for a Hamiltonian, which has no discrete Lagrangian.
+pub(super) const fn has_custom<L: FormulaSystem<N>, const N: usize>() -> bool {
+    FULL && !L::HINTS.hamiltonian
+}
+
+/// The error for a system for which they are not.
+pub(super) fn no_custom() -> RuntimeError {
+    let what = "discrete Lagrangians";
+    if FULL { RuntimeError::OfLagrangians { what } } else { not_compiled(what) }
 }
 
 impl<const N: usize> FormulaStep<N> {

@@ -4,6 +4,7 @@ use super::formula_system::Observed;
 use super::observed::{MemberObserver, MemberRecord};
 use super::recorder::{Crossings, check_events, number};
 use super::sized::coordinates;
+use crate::clock::Clock;
 use crate::{
     Column, Ending, Ensemble, EnsembleMonitor, Event, Interrupt, MemberEnd, RuntimeError, Start, StepControl, Varied,
 };
@@ -12,7 +13,7 @@ use discrete_herglotz::{InputError, Row, Vector};
 use formula_lagrangian::{Expression, FormulaError};
 use std::borrow::Cow;
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The number of members that are computed together in SIMD lanes: a multiple of every number of lanes.
 const SHARD_MEMBERS: usize = 384;
@@ -70,7 +71,7 @@ pub(super) fn run(
     let interrupt = monitor.interrupt();
     let (mut results, mut first) = (Results { tally: Tally::default(), monitor, ended: false }, 0);
     while first < ensemble.count {
-        let (clock, size) = (Instant::now(), shards * shard);
+        let (clock, size) = (Clock::new(), shards * shard);
         let members = first..ensemble.count.min(first + size);
         first = members.end;
         run_members(system, &Block::new(ensemble, members, observed, interrupt.as_ref()), &mut results)?;

@@ -3,7 +3,8 @@
 
 use super::sized::{Sized, coordinates};
 use super::work_thread::on_large_stack;
-use super::{Differentiated, Kernel, check, ensemble, run, sensitivity};
+use super::{Differentiated, ENSEMBLES, Kernel, check, ensemble, run, sensitivity};
+use crate::full::{FULL, not_compiled};
 use crate::kernel::formula_system::{FormulaSystem, Observed};
 use crate::{
     Check, Ensemble, EnsembleMonitor, FormulaSymmetry, HamiltonianGeometry, InitialVelocity, Loss, LossGradient,
@@ -93,7 +94,7 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
     }
 
     fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        ensemble::run(self, ensemble, monitor)
+        if const { FULL } { ensemble::run(self, ensemble, monitor) } else { Err(not_compiled(ENSEMBLES)) }
     }
 
     fn sensitivity(
@@ -121,6 +122,18 @@ impl<const N: usize> Kernel for Sized<Hamiltonian<N>, N> {
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
         sensitivity::lyapunov_exponents(&self.differentiable()?, motion, monitor)
+    }
+
+    /// The contact Hamiltonian vector field at `y = (q, p, z)`.
+    fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
+        let n = self.0.formula().dimension();
+        let part = |first: usize| {
+            SVector::<f64, N>::from_fn(|i, _| if i < n { y.get(first + i).copied().unwrap_or(f64::NAN) } else { 0.0 })
+        };
+        let state = PhasePoint { q: part(0), p: part(n), z: y.get(2 * n).copied().unwrap_or(f64::NAN) };
+        let field = self.0.hamiltonian().contact_field(t, &state);
+        let all = coordinates(field.x.as_slice(), n).iter().chain(coordinates(field.y.as_slice(), n)).chain([&field.z]);
+        to.iter_mut().zip(all).for_each(|(to, from)| *to = *from);
     }
 
     /// The geometry at a momentum, or at a velocity that has one.

@@ -1,8 +1,10 @@
 //! Derivatives of the members of an ensemble.
 
+use super::DERIVATIVES;
 use super::ensemble_of::invalid_start;
 use super::sensitivity::{covector, loss_gradient, sensitivity_of, state};
 use super::sized::Sized;
+use crate::full::{FULL, not_compiled};
 use crate::{BatchLoss, Ensemble, Interrupt, LossGradient, MotionState, RuntimeError, Sensitivity, StepControl};
 use discrete_herglotz::ensemble::{EnsembleError, Lagrangians};
 use discrete_herglotz::sensitivity::{SensitivityError, Variable};
@@ -19,6 +21,9 @@ pub(super) fn gradients<const N: usize>(
     loss: &BatchLoss<'_>,
     interrupt: Option<&Interrupt>,
 ) -> Result<Vec<Result<LossGradient, RuntimeError>>, RuntimeError> {
+    if const { !FULL } {
+        return Err(not_compiled(DERIVATIVES));
+    }
     let n = system.0.formula().dimension();
     let found = each_block(system, ensemble, interrupt, |members, first| {
         let of_states = |i: usize, states: &[MotionState]| {
@@ -38,6 +43,9 @@ pub(super) fn sensitivities<const N: usize>(
     times: &[f64],
     interrupt: Option<&Interrupt>,
 ) -> Result<Vec<Result<Sensitivity, RuntimeError>>, RuntimeError> {
+    if const { !FULL } {
+        return Err(not_compiled(DERIVATIVES));
+    }
     let n = system.0.formula().dimension();
     let found = each_block(system, ensemble, interrupt, |members, _| {
         members.tangent_at(variables, times, Until::Time(ensemble.end))

@@ -22,6 +22,7 @@ mod sized;
 mod theorems;
 mod work_thread;
 
+use crate::full::{FULL, not_compiled};
 use crate::{
     BatchLoss, Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Geometry, HamiltonianGeometry, Interrupt, Loss,
     LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
@@ -122,6 +123,13 @@ pub(crate) trait Kernel: Send + Sync {
 /// What a Hamiltonian has no kernel for, nor a formula with constraints.
 const DERIVATIVES: &str = "derivatives of motions";
 
+const ENSEMBLES: &str = "ensembles";
+
+/// Whether there is a kernel of this number of coordinates: without the feature `full` only of a few.
+const fn has_kernel(coordinates: usize) -> bool {
+    FULL || matches!(coordinates, 1 | 2 | 4 | constrained::MAX_CONSTRAINED_COORDINATES)
+}
+
 /// The largest number of coordinates for which kernels are compiled.
 const MOST_COMPILED_COORDINATES: usize = 16;
 
@@ -138,8 +146,11 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
     macro_rules! of {
         ($($n:literal)*) => {
             match formula.dimension() {
-                $(found if found <= $n && (!constrained || constrained::is_compiled($n)) => Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>),)*
-                _ => many::kernel_of(formula),
+                $(found if const { has_kernel($n) } && found <= $n && (!constrained || constrained::is_compiled($n)) => {
+                    Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>)
+                })*
+                _ if const { FULL } => many::kernel_of(formula),
+                _ => Err(not_compiled("formulas with more coordinates")),
             }
         };
     }
@@ -203,7 +214,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
     }
 
     fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        ensemble::run(self, ensemble, monitor)
+        if const { FULL } { ensemble::run(self, ensemble, monitor) } else { Err(not_compiled(ENSEMBLES)) }
     }
 
     fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {

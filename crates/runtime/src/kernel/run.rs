@@ -34,8 +34,8 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     };
     if let Some(method) = &motion.method {
         // Written so that it is not compiled for Hamiltonians.
-        if const { L::HINTS.hamiltonian } {
-            return Err(discrete::of_lagrangians());
+        if const { !discrete::has_custom::<L, N>() } {
+            return Err(discrete::no_custom());
         } else {
             let by = discrete::custom::<L, N>(method, &system.0)?;
             let run = match motion.step_control {

@@ -1,11 +1,13 @@
 //! Derivatives of motions.
 
+use super::DERIVATIVES;
 use super::event_times::Differentiated;
 use super::formula_system::FormulaSystem;
 use super::moved_start::{self, MovedStart};
 use super::recorder::Recorder;
 use super::run;
 use super::sized::{Sized, coordinates};
+use crate::full::{FULL, not_compiled};
 use crate::{
     EndCovector, Gradient, Loss, LossGradient, LyapunovExponents, Motion, MotionState, RunMonitor, RuntimeError,
     Sensitivity, StateDerivative,
@@ -68,6 +70,9 @@ pub(super) fn tangent<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
     of: Differentiated<'_>,
     monitor: &mut dyn RunMonitor,
 ) -> Result<Sensitivity, RuntimeError> {
+    if const { !FULL } {
+        return Err(not_compiled(DERIVATIVES));
+    }
     let requested = motion;
     let motion = &unobserved(motion);
     let problem = system.problem_of(motion)?;
@@ -91,6 +96,9 @@ pub(super) fn lyapunov_exponents<L: FormulaSystem<N> + Parametric<N>, const N: u
     motion: &Motion,
     monitor: &mut dyn RunMonitor,
 ) -> Result<LyapunovExponents, RuntimeError> {
+    if const { !FULL } {
+        return Err(not_compiled(DERIVATIVES));
+    }
     let motion = &unobserved(motion);
     let (problem, n) = (system.problem_of(motion)?, system.0.formula().dimension());
     let mut recorder = Recorder::new(&system.0, motion, monitor)?;
@@ -128,6 +136,9 @@ pub(super) fn gradient<L: FormulaSystem<N> + Parametric<N>, const N: usize>(
     loss: &mut Loss<'_>,
     monitor: &mut dyn RunMonitor,
 ) -> Result<LossGradient, RuntimeError> {
+    if const { !FULL } {
+        return Err(not_compiled(DERIVATIVES));
+    }
     moved_start::check(motion)?;
     let motion = &unobserved(motion);
     let moved = MovedStart::of(system, motion)?;

@@ -3,6 +3,7 @@
 use super::system::SiteSystem;
 use super::term::AtRest;
 use crate::RuntimeError;
+use crate::full::{FULL, not_compiled};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{Lagrangian, VelocityPoint};
 use formula_lagrangian::{Formula, FormulaLagrangian};
@@ -84,8 +85,9 @@ impl Lattice {
     pub fn system(&self) -> Result<SiteSystem, RuntimeError> {
         match self.coordinates.len() {
             1 => self.of::<1, 2>(),
-            2 => self.of::<2, 4>(),
-            3 => self.of::<3, 6>(),
+            2 if const { FULL } => self.of::<2, 4>(),
+            3 if const { FULL } => self.of::<3, 6>(),
+            2 | 3 => Err(not_compiled("lattices with several coordinates at a site")),
             found => Err(RuntimeError::argument("coordinates", format!("has {found} names; it must have 1 to 3"))),
         }
     }

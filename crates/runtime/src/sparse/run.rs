@@ -2,11 +2,12 @@
 
 use super::stepper::{OwnedState, Stepper};
 use super::system::SiteSystem;
+use crate::clock::Clock;
 use crate::outcome::KeptRows;
 use crate::{InitialVelocity, Outcome, OutputTimes, RunMonitor, RuntimeError, Start};
 use discrete_herglotz::{AnyIntegrator, InputError, Status, StepError, StepFailure, Steps};
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The time between two polls: short for a user, long for a step.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -237,7 +238,7 @@ impl SparseRun<'_, '_> {
     /// Takes steps until this number has been taken.
     fn advance(&mut self, to: usize) -> Result<(), Ended> {
         while self.taken < to {
-            let begin = Instant::now();
+            let begin = Clock::new();
             // The conformal factor is that of a single step, so it is read after each.
             let steps_between_polls =
                 if self.motion.conformal_factor { 1 } else { self.steps_between_polls.min(to - self.taken) };

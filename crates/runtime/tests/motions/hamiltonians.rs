@@ -158,3 +158,21 @@ fn the_accuracy_of_a_hamiltonian_that_is_linear_in_momenta() {
         }
     }
 }
+
+/// In coordinates that fill a kernel and in others.
+#[test]
+fn rates_are_the_contact_field() {
+    let systems =
+        [("p_x^2/2 + x^2/2 + k*z", &["x"][..]), ("p_x^2/2 + x*p_y*z + c(2 + x^2) + y*w*p_w", &["x", "y", "w"])];
+    for (text, coordinates) in systems {
+        let (system, n) = (System::new(&formula(text, coordinates)).unwrap(), coordinates.len());
+        let (q, p) = (&[0.7, -0.4, 1.3][..n], [0.3, 1.1, -0.6][..n].to_vec());
+        let y = [q, &p, &[0.2]].concat();
+        let mut rates = vec![0.0; 2 * n + 1];
+        system.rates(0.5, &y, &mut rates);
+        let at = Start { velocity: InitialVelocity::Momentum(p), ..Start::new(0.5, q, [], 0.2) };
+        assert_eq!(rates, system.hamiltonian_geometry(&at).unwrap().field, "{text}");
+        system.rates(0.5, &y[1..], &mut rates);
+        assert!(rates.iter().all(|rate| rate.is_nan()), "{text}");
+    }
+}

@@ -1,0 +1,364 @@
+// The figures of a motion.
+import * as Plot from "@observablehq/plot";
+
+/// The points of a curve that are drawn: more are not visible.
+const MOST_POINTS = 1500;
+/// The coordinates of a figure with one curve for each.
+const MOST_CURVES = 6;
+const MOST_MARKS = 3000;
+
+const size = { width: 460, height: 250, marginLeft: 52, marginRight: 14, style: { overflow: "visible" } };
+const DASHED = "5,4";
+/// Of a path in space: equal scales.
+const SPACE = { aspectRatio: 1, height: undefined, width: 320 };
+
+/// The rows of an answer: its columns by name, each a function of the row.
+export class Rows {
+  constructor(numbers, columns) {
+    this.columns = columns;
+    this.width = columns.length;
+    this.numbers = numbers;
+    this.count = Math.floor(numbers.length / this.width);
+  }
+
+  has(name) {
+    return this.columns.includes(name);
+  }
+
+  column(name) {
+    const at = this.columns.indexOf(name);
+    return (row) => this.numbers[row * this.width + at];
+  }
+
+  /// The numbers of the rows that are drawn.
+  drawn() {
+    const stride = Math.max(1, Math.ceil(this.count / MOST_POINTS));
+    const rows = [];
+    for (let row = 0; row < this.count; row += stride) rows.push(row);
+    if (this.count && rows.at(-1) !== this.count - 1) rows.push(this.count - 1);
+    return rows;
+  }
+
+  /// The numbers of a column that are not finite.
+  gaps(name) {
+    const of = this.column(name);
+    let count = 0;
+    for (let row = 0; row < this.count; row++) count += Number.isFinite(of(row)) ? 0 : 1;
+    return count;
+  }
+}
+
+const frame = (marks, options) =>
+  Plot.plot({
+    ...size,
+    grid: true,
+    ...options,
+    x: { ticks: 6, ...options.x },
+    y: { ticks: 6, nice: true, ...options.y },
+    marks,
+  });
+
+const curve = (rows, x, y, options) => Plot.line(rows.drawn(), { x: rows.column(x), y: rows.column(y), ...options });
+
+const legend = (names) => ({ legend: names.length > 1, domain: names, scheme: "tableau10" });
+
+/// Columns against time, each with its name.
+const againstTime = (rows, names, label, peer) =>
+  frame(
+    [
+      ...names.map((name) => curve(rows, "t", name, { stroke: () => name })),
+      ...(peer ? names.map((name) => curve(peer, "t", name, { stroke: () => name, strokeDasharray: "1,3" })) : []),
+    ],
+    { x: { label: "t" }, y: { label }, color: legend(names) },
+  );
+
+/// Dissipated quantities, with what the conformal factor predicts from their first values: dashed, and on the curve if the law holds.
+const dissipated = (rows, names, label, peer) => {
+  const factor = rows.has("log_factor") ? rows.column("log_factor") : undefined;
+  const predicted = (name) => {
+    const of = rows.column(name);
+    return (row) => of(0) * Math.exp(factor(row) - factor(0));
+  };
+  const shown = [...names, ...(factor ? ["exact factor"] : []), ...(peer ? ["Runge-Kutta"] : [])];
+  return frame(
+    [
+      ...names.map((name) => curve(rows, "t", name, { stroke: () => name, strokeWidth: 2 })),
+      ...(peer ? names.map((name) => curve(peer, "t", name, { stroke: () => "Runge-Kutta" })) : []),
+      ...(factor
+        ? names.map((name) =>
+            Plot.line(rows.drawn(), {
+              x: rows.column("t"),
+              y: predicted(name),
+              stroke: () => "exact factor",
+              strokeDasharray: DASHED,
+            }),
+          )
+        : []),
+    ],
+    { x: { label: "t" }, y: { label }, color: legend(shown) },
+  );
+};
+
+/// The smallest distance from a law that is drawn: below it is round-off.
+const ROUND_OFF = 1e-16;
+
+/// How far quantities are from the law of the conformal factor, relative to it, on a logarithmic scale.
+const departures = (curves) =>
+  frame(
+    curves.map(({ name, points, isPeer }) =>
+      Plot.line(points, {
+        x: ([t]) => t,
+        y: ([, ratio]) => Math.max(Math.abs(ratio - 1), ROUND_OFF),
+        stroke: () => name,
+        strokeWidth: isPeer ? 1 : 2,
+      }),
+    ),
+    { x: { label: "t" }, y: { label: "relative distance", type: "log", ticks: 5, tickFormat: "~e" }, color: legend(curves.map(({ name }) => name)) },
+  );
+
+/// The departures of dissipated quantities of a motion, and of the same by Runge-Kutta. The factor is that of the motion.
+const departuresOf = (rows, peer, names) => {
+  const [t, log] = [rows.column("t"), rows.column("log_factor")];
+  const at = (time) => {
+    // The rows of the peer are at other times.
+    let [low, high] = [0, rows.count - 1];
+    const forward = t(high) >= t(low);
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (t(middle) <= time === forward) low = middle;
+      else high = middle;
+    }
+    const part = t(high) === t(low) ? 0 : (time - t(low)) / (t(high) - t(low));
+    return log(low) + part * (log(high) - log(low));
+  };
+  const points = (from, name, factor) => {
+    const [time, of] = [from.column("t"), from.column(name)];
+    return from.drawn().map((row) => [time(row), of(row) / (of(0) * Math.exp(factor(row, time(row))))]);
+  };
+  return departures(
+    names.flatMap((name) => [
+      { name, points: points(rows, name, (row) => log(row) - log(0)) },
+      { name: `${name}, Runge-Kutta`, points: points(peer, name, (_, time) => at(time) - log(0)), isPeer: true },
+    ]),
+  );
+};
+
+/// A path in a plane; equal scales for a path in space.
+const inPlane = (rows, x, y, options, peer) =>
+  frame(
+    [
+      ...(peer ? [curve(peer, x, y, { stroke: "var(--peer)", strokeWidth: 1 })] : []),
+      curve(rows, x, y, { stroke: "var(--curve)", strokeWidth: 1.2 }),
+      Plot.dot([0], { x: rows.column(x), y: rows.column(y), r: 6, fill: "var(--start)", title: () => "start" }),
+    ],
+    { x: { label: x, ...options.x }, y: { label: y }, ...options.frame },
+  );
+
+/// Whether the energy is multiplied by the conformal factor.
+const keepsEnergy = (scene) =>
+  !scene.is_forced && !scene.has_resets && scene.properties.some(({ name, is_proved }) => name === "autonomous" && is_proved);
+
+/// The figures of a motion of a formula.
+const ofFormula = (scene, rows, { coordinate, peer, answer }) => {
+  const figures = [];
+  const name = scene.coordinates[coordinate] ?? scene.coordinates[0];
+  const index = scene.coordinates.indexOf(name);
+  const velocity = scene.velocities[index];
+  const second = scene.is_hamiltonian ? scene.momenta[index] : velocity;
+  const shown = scene.coordinates.slice(0, MOST_CURVES);
+  const and = (peer) => (peer ? ", dotted by Runge-Kutta" : "");
+  const laws = [...(keepsEnergy(scene) ? ["energy"] : []), ...(scene.is_forced ? [] : scene.symmetries)];
+  if (peer && laws.length && rows.has("log_factor")) {
+    figures.push({ name: "law", title: "Distance from the law of the conformal factor", svg: departuresOf(rows, peer, laws.slice(0, 3)) });
+  }
+  figures.push({ name: "coordinates", title: `Coordinates against time${and(peer)}`, svg: againstTime(rows, shown, shown.join(", "), peer) });
+  figures.push({
+    name: "phase",
+    title: "Phase portrait: drag the start",
+    svg: inPlane(rows, name, second, { frame: {} }, peer),
+    start: { x: name, y: second },
+  });
+  const plane = planeOf(scene.coordinates);
+  if (plane) {
+    const path = inPlane(rows, plane[0], plane[1], { frame: SPACE }, peer);
+    figures.push({ name: "path", title: "Path in the plane", svg: path });
+  }
+  figures.push({
+    name: "energy",
+    title: keepsEnergy(scene) ? "Energy, and what the conformal factor predicts" : "Energy, which forces, resets or the time change",
+    svg: keepsEnergy(scene) ? dissipated(rows, ["energy"], "energy", peer) : againstTime(rows, ["energy"], "energy", peer),
+  });
+  if (scene.symmetries.length) {
+    const momenta = scene.symmetries.slice(0, MOST_CURVES);
+    figures.push({ name: "momenta", title: "Dissipated momenta of the symmetries", svg: dissipated(rows, momenta, "momenta", peer) });
+  }
+  figures.push({ name: "action", title: "Action z", svg: againstTime(rows, [scene.action], scene.action, peer) });
+  if (answer.events?.length) {
+    const [q, v] = [answer.of_events.indexOf(name) + 1, answer.of_events.indexOf(second) + 1];
+    const points = answer.events.slice(0, MOST_MARKS);
+    figures.push({
+      name: "section",
+      title: `Poincaré's section: the events, ${answer.event_count} of them`,
+      svg: frame([Plot.dot(points, { x: (row) => row[q], y: (row) => row[v], r: 1.8, fill: "var(--curve)" })], {
+        x: { label: name, ...intervalOf(points.map((row) => row[q]), rows, name) },
+        y: { label: second, ...intervalOf(points.map((row) => row[v]), rows, second) },
+      }),
+    });
+  }
+  return figures;
+};
+
+/// The interval of an axis for numbers that differ by round-off alone: that of the motion.
+const intervalOf = (numbers, rows, name) => {
+  const [of, all] = [rows.column(name), rows.drawn()];
+  const [low, high] = [Math.min(...all.map(of)), Math.max(...all.map(of))];
+  const isPoint = Math.max(...numbers) - Math.min(...numbers) < 1e-9 * (high - low);
+  return isPoint ? { domain: [low, high] } : {};
+};
+
+/// Two coordinates in a plane, by their names.
+export const planeOf = (names) => {
+  const pairs = [["x", "y"], ["x3", "y3"], ["x1", "y1"], ["q[0]", "q[1]"]];
+  return pairs.find((pair) => pair.every((name) => names.includes(name)));
+};
+
+const ofBody = (rows, answer) => {
+  const momenta = ["M3", "Pi3"];
+  return [
+    { name: "tip", title: "Path of the centre of mass from above", svg: inPlane(rows, "tip_x", "tip_y", { frame: SPACE }) },
+    { name: "height", title: "Height of the centre of mass", svg: againstTime(rows, ["tip_z"], "tip_z") },
+    { name: "polhode", title: "Momentum in the body", svg: againstTime(rows, ["Pi1", "Pi2", "Pi3"], "Pi") },
+    { name: "energy", title: "Energy", svg: withFactor(rows, ["energy"], "energy", answer.gamma) },
+    { name: "momenta", title: "Momenta about the vertical and the axis of the body", svg: againstTime(rows, momenta, "M3, Pi3") },
+    { name: "action", title: "Action z", svg: againstTime(rows, ["z"], "z") },
+  ];
+};
+
+/// The same as `dissipated` at a constant rate.
+const withFactor = (rows, names, label, gamma) => {
+  const [t, of] = [rows.column("t"), rows.column(names[0])];
+  const predicted = (row) => of(0) * Math.exp(gamma * (t(row) - t(0)));
+  return frame(
+    [
+      curve(rows, "t", names[0], { stroke: () => names[0], strokeWidth: 2 }),
+      Plot.line(rows.drawn(), { x: t, y: predicted, stroke: () => "exact factor", strokeDasharray: DASHED }),
+    ],
+    { x: { label: "t" }, y: { label }, color: legend([...names, "exact factor"]) },
+  );
+};
+
+const ofLattice = (scene, rows) => {
+  const sites = scene.sizes.reduce((product, size) => product * size, 1);
+  const first = 1;
+  const cells = [];
+  for (let row = 0; row < rows.count; row++) {
+    for (let site = 0; site < sites; site++) cells.push(rows.numbers[row * rows.width + first + site]);
+  }
+  const t = rows.column("t");
+  const spaceTime = frame(
+    [Plot.raster(cells, { width: sites, height: rows.count, x1: 0, x2: sites, y1: t(0), y2: t(rows.count - 1), imageRendering: "pixelated" })],
+    { x: { label: "site" }, y: { label: "t" }, color: { scheme: "RdBu", legend: true } },
+  );
+  const shape = (row) =>
+    Plot.line(Array.from({ length: sites }, (_, site) => site), {
+      x: (site) => site,
+      y: (site) => rows.numbers[row * rows.width + first + site],
+      stroke: () => `t = ${t(row)}`,
+    });
+  const shapes = [0, Math.floor(rows.count / 2), rows.count - 1];
+  return [
+    { name: "space_time", title: "The sites against time", svg: spaceTime },
+    {
+      name: "shapes",
+      title: "The sites at three times",
+      svg: frame(shapes.map(shape), { x: { label: "site" }, y: { label: scene.coordinates[0] }, color: legend(shapes.map((row) => `t = ${t(row)}`)) }),
+    },
+    { name: "energy", title: "Energy", svg: againstTime(rows, ["energy"], "energy") },
+    { name: "action", title: "Action z", svg: againstTime(rows, ["z"], "z") },
+  ];
+};
+
+/// The figures of an answer: a name, a title and a picture of each.
+export const figuresOf = (scene, rows, options) => {
+  if (!rows.count) return [];
+  if (scene.kind === "body") return ofBody(rows, options.answer);
+  if (scene.kind === "lattice") return ofLattice(scene, rows);
+  return ofFormula(scene, rows, options);
+};
+
+/// The area within a closed curve of points that depend smoothly on an angle, up to a factor: by its Fourier coefficients.
+const area = (points) => {
+  const n = points.length;
+  let sum = 0;
+  for (let k = 1; k < n / 2; k++) {
+    let [qc, qs, pc, ps] = [0, 0, 0, 0];
+    points.forEach(([q, p], j) => {
+      const angle = (2 * Math.PI * ((j * k) % n)) / n;
+      const [c, s] = [Math.cos(angle), Math.sin(angle)];
+      qc += q * c;
+      qs += q * s;
+      pc += p * c;
+      ps += p * s;
+    });
+    sum += k * (qc * ps - qs * pc);
+  }
+  return sum;
+};
+
+/// The positions and momenta of the members of a cloud at a time.
+const cloudAt = ({ numbers, times, members }, time) =>
+  Array.from({ length: members }, (_, member) => {
+    const at = 2 * (member * times.length + time);
+    return [numbers[at], numbers[at + 1]];
+  });
+
+/// The figures of a cloud of starts: the cloud at some times, and the area within it against the law of contact flows.
+export const figuresOfCloud = (scene, cloud, peer, coordinate) => {
+  const [q, p] = [scene.coordinates[coordinate], scene.momenta[coordinate]];
+  const times = cloud.times.length;
+  const shown = [0, 1, 2, 3, 4].map((k) => Math.round((k * (times - 1)) / 4));
+  const closed = (points) => [...points, points[0]];
+  const of = (name, from) => {
+    const first = area(cloudAt(from, 0));
+    return from.times.map((t, k) => ({ name, t, area: area(cloudAt(from, k)) / first }));
+  };
+  const ratios = (from) => of("", from).map(({ t, area }, k) => [t, area / Math.exp(cloud.log_factor[k])]);
+  const law = cloud.times.map((t, k) => ({ name: "exact factor", t, area: Math.exp(cloud.log_factor[k]) }));
+  const names = ["this method", ...(peer ? ["Runge-Kutta"] : []), ...(cloud.is_constant ? ["exact factor"] : [])];
+  return [
+    {
+      name: "cloud",
+      title: `${cloud.members} starts on a circle, at five times`,
+      svg: frame(
+        shown.map((k) =>
+          Plot.line(closed(cloudAt(cloud, k)), { x: (point) => point[0], y: (point) => point[1], stroke: () => `t = ${+cloud.times[k].toPrecision(3)}` }),
+        ),
+        { x: { label: q }, y: { label: p }, color: legend(shown.map((k) => `t = ${+cloud.times[k].toPrecision(3)}`)) },
+      ),
+    },
+    {
+      name: "area",
+      title: cloud.is_constant ? "Area within the circle, relative to the first" : "Area within the circle; the rate is not constant, and there is no law for it",
+      svg: frame(
+        [
+          Plot.line(of("this method", cloud), { x: "t", y: "area", stroke: "name", strokeWidth: 2 }),
+          ...(peer ? [Plot.line(of("Runge-Kutta", peer), { x: "t", y: "area", stroke: "name" })] : []),
+          ...(cloud.is_constant ? [Plot.line(law, { x: "t", y: "area", stroke: "name", strokeDasharray: DASHED })] : []),
+        ],
+        { x: { label: "t" }, y: { label: "area" }, color: legend(names) },
+      ),
+    },
+    ...(cloud.is_constant
+      ? [
+          {
+            name: "area_law",
+            title: "Distance of the area from the law",
+            svg: departures([
+              { name: "this method", points: ratios(cloud) },
+              ...(peer ? [{ name: "Runge-Kutta", points: ratios(peer), isPeer: true }] : []),
+            ]),
+          },
+        ]
+      : []),
+  ];
+};
