@@ -1,5 +1,5 @@
-//! Many starts on a circle in a plane of position and momentum: the area within it is multiplied by the conformal factor, where this is
-//! constant, by a flow of contact transformations.
+//! Many starts on a circle in a plane of position and momentum. A flow of contact transformations multiplies the area within it, the
+//! integral of `p dq` over all coordinates, by the conformal factor, where the rate of this is constant.
 
 use crate::host;
 use crate::numbers::number;
@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 /// The maximal number of members, and of times.
 const MOST: usize = 1000;
 
-/// The motions of starts on a circle. Position and momentum of all members are passed to the host, time by time for each member; the
+/// The motions of starts on a circle. Positions and momenta in all coordinates are passed to the host, for each member time by time; the
 /// answer has the times, and the logarithm of the conformal factor at each of them for the motion of the scene.
 pub fn cloud(request: &str) -> Value {
     answer(request, |request| {
@@ -50,7 +50,7 @@ fn of(scene: &Scene, request: &Request) -> Result<Value, Value> {
     if coordinate >= formula.dimension() || !(1..=MOST).contains(&members) || !(1..=MOST).contains(&times) {
         return Err(refusal("the request has another number of coordinates, members or times"));
     }
-    let deadline = Deadline::new();
+    let (deadline, n) = (Deadline::new(), formula.dimension());
     let motion = Motion { interrupt: Some(deadline.interrupt()), ..scene.bare_motion() };
     let plan = scene.system.plan(&motion).map_err(of_motion(scene))?;
     let (t0, span) = (motion.start.t, motion.end - motion.start.t);
@@ -58,7 +58,7 @@ fn of(scene: &Scene, request: &Request) -> Result<Value, Value> {
     let motion = Motion {
         step_control: planned(&plan).unwrap_or(motion.step_control),
         rows: Some(OutputTimes::At(at.clone())),
-        columns: vec![Column::Position(coordinate), Column::Momentum(coordinate)],
+        columns: (0..n).map(Column::Position).chain((0..n).map(Column::Momentum)).collect(),
         ..motion
     };
     let momentum = momentum(scene, &motion.start)?;
@@ -82,11 +82,11 @@ fn of(scene: &Scene, request: &Request) -> Result<Value, Value> {
                 failed += usize::from(outcome.is_err());
                 rows.numbers
             }
-            By::RungeKutta => by_runge_kutta(scene, (&start(k), coordinate), (&at, request.evaluations))?,
+            By::RungeKutta => by_runge_kutta(scene, &start(k), (&at, request.evaluations))?,
         };
         // A motion that ended early has no place at the times after it.
-        failed += usize::from(rows.len() < 2 * at.len());
-        rows.resize(2 * at.len(), f64::NAN);
+        failed += usize::from(rows.len() < 2 * n * at.len());
+        rows.resize(2 * n * at.len(), f64::NAN);
         host::rows(&rows);
     }
     let mut factors = Rows { numbers: Vec::new(), deadline };
@@ -95,6 +95,7 @@ fn of(scene: &Scene, request: &Request) -> Result<Value, Value> {
     Ok(json!({
         "times": at,
         "members": members,
+        "dimension": n,
         "failed": failed,
         "log_factor": factors.numbers.into_iter().map(number).collect::<Vec<_>>(),
         "is_constant": scene.properties().iter().any(|property| property.name == "constant_rate" && property.is_proved),
@@ -112,26 +113,19 @@ fn momentum(scene: &Scene, start: &Start) -> Result<Vec<f64>, Value> {
     })
 }
 
-/// Position and momentum of a member at some times, by the Runge-Kutta method.
-fn by_runge_kutta(
-    scene: &Scene,
-    (start, coordinate): (&Start, usize),
-    (at, evaluations): (&[f64], u64),
-) -> Result<Vec<f64>, Value> {
+/// Positions and momenta of a member at some times, by the Runge-Kutta method.
+fn by_runge_kutta(scene: &Scene, start: &Start, (at, evaluations): (&[f64], u64)) -> Result<Vec<f64>, Value> {
     let formula = scene.system.formula();
     let mut method = RungeKutta::new(&scene.system, start)?;
-    let momenta = formula.momenta();
-    let momentum = Quantities::new(formula, momenta.get(coordinate).into_iter());
+    let momenta = Quantities::new(formula, formula.momenta().iter());
     let steps = (evaluations as usize / EVALUATIONS_PER_STEP).div_ceil(at.len().max(2) - 1).max(1);
-    let mut numbers = Vec::with_capacity(2 * at.len());
+    let mut numbers = Vec::with_capacity(2 * formula.dimension() * at.len());
     let mut push = |t: f64, y: &[f64]| {
-        numbers.push(y[coordinate]);
-        numbers.extend(momentum.at(t, y));
+        numbers.extend(y.iter().take(formula.dimension()));
+        numbers.extend(momenta.at(t, y));
     };
+    push(at.first().copied().unwrap_or(f64::NAN), &method.y);
     for (from, to) in at.iter().zip(at.iter().skip(1)) {
-        if from == &at[0] {
-            push(*from, &method.y);
-        }
         let h = (to - from) / steps as f64;
         (0..steps).for_each(|k| method.step(from + k as f64 * h, h));
         push(*to, &method.y);

@@ -213,6 +213,11 @@ test("forces, backward time, the cloud and the Runge-Kutta method", async () => 
     await ended(page);
     const names = await page.$$eval("#figures figure[data-name]", (all) => all.map((figure) => figure.dataset.name));
     for (const name of ["law", "cloud", "area", "area_law"]) assert.ok(names.includes(name), `${name} of ${names}`);
+    // The area obeys the law to round-off, and that of the Runge-Kutta method does not.
+    const heights = await page.$$eval('[data-name="area_law"] svg[role="img"] g[aria-label="line"] path', (all) =>
+      all.map((path) => Number(path.getAttribute("d").split(",").at(-1))),
+    );
+    assert.ok(heights.length === 2 && heights[0] - heights[1] > 40, `${heights}`);
     assert.match(await page.textContent("#plan"), /the defect of the contact form is \d\.\de-1\d/);
     await page.click("#backward");
     await ended(page);

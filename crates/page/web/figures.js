@@ -48,19 +48,51 @@ export class Rows {
   }
 }
 
-const frame = (marks, options) =>
-  Plot.plot({
+/// The colours of curves, by their names: Tableau's ten.
+const COLORS = ["#4e79a7", "#f28e2c", "#e15759", "#76b7b2", "#59a14f", "#edc949", "#af7aa1", "#ff9da7", "#9c755f", "#bab0ab"];
+/// The width of a letter of a legend, the height of its lines, and its width.
+const [LETTER, LINE, WIDTH] = [6, 13, 330];
+
+/// The names of curves in their colours, in lines above the frame: a part of the picture, so that it is saved with it.
+const legendOf = (names) => {
+  const lines = [[]];
+  let width = 0;
+  for (const name of names) {
+    const own = LETTER * (name.length + 2);
+    if (width + own > WIDTH && lines.at(-1).length) {
+      lines.push([]);
+      width = 0;
+    }
+    lines.at(-1).push({ name, at: width });
+    width += own;
+  }
+  const mark = ({ name, at }, line) =>
+    Plot.text([name], {
+      frameAnchor: "top-right",
+      textAnchor: "start",
+      dx: at - WIDTH,
+      dy: -LINE * (lines.length - line) - 4,
+      fill: COLORS[names.indexOf(name) % COLORS.length],
+      fontWeight: 600,
+    });
+  return { marks: lines.flatMap((all, line) => all.map((one) => mark(one, line))), height: LINE * lines.length };
+};
+
+const frame = (marks, { names = [], ...options }) => {
+  const legend = legendOf(names.length > 1 ? names : []);
+  return Plot.plot({
     ...size,
+    marginTop: 18 + (names.length > 1 ? legend.height : 0),
     grid: true,
+    color: { domain: names, range: COLORS },
     ...options,
     x: { ticks: 6, ...options.x },
     y: { ticks: 6, nice: true, ...options.y },
-    marks,
+    marks: [...marks, ...legend.marks],
   });
+};
 
 const curve = (rows, x, y, options) => Plot.line(rows.drawn(), { x: rows.column(x), y: rows.column(y), ...options });
-
-const legend = (names) => ({ legend: names.length > 1, domain: names, scheme: "tableau10" });
 
 /// Columns against time, each with its name.
 const againstTime = (rows, names, label, peer) =>
@@ -69,7 +101,7 @@ const againstTime = (rows, names, label, peer) =>
       ...names.map((name) => curve(rows, "t", name, { stroke: () => name })),
       ...(peer ? names.map((name) => curve(peer, "t", name, { stroke: () => name, strokeDasharray: "1,3" })) : []),
     ],
-    { x: { label: "t" }, y: { label }, color: legend(names) },
+    { x: { label: "t" }, y: { label }, names },
   );
 
 /// Dissipated quantities, with what the conformal factor predicts from their first values: dashed, and on the curve if the law holds.
@@ -95,7 +127,7 @@ const dissipated = (rows, names, label, peer) => {
           )
         : []),
     ],
-    { x: { label: "t" }, y: { label }, color: legend(shown) },
+    { x: { label: "t" }, y: { label }, names: shown },
   );
 };
 
@@ -113,7 +145,7 @@ const departures = (curves) =>
         strokeWidth: isPeer ? 1 : 2,
       }),
     ),
-    { x: { label: "t" }, y: { label: "relative distance", type: "log", ticks: 5, tickFormat: "~e" }, color: legend(curves.map(({ name }) => name)) },
+    { x: { label: "t" }, y: { label: "relative distance", type: "log", ticks: 5, tickFormat: "~e" }, names: curves.map(({ name }) => name) },
   );
 
 /// The departures of dissipated quantities of a motion, and of the same by Runge-Kutta. The factor is that of the motion.
@@ -243,7 +275,7 @@ const withFactor = (rows, names, label, gamma) => {
       curve(rows, "t", names[0], { stroke: () => names[0], strokeWidth: 2 }),
       Plot.line(rows.drawn(), { x: t, y: predicted, stroke: () => "exact factor", strokeDasharray: DASHED }),
     ],
-    { x: { label: "t" }, y: { label }, color: legend([...names, "exact factor"]) },
+    { x: { label: "t" }, y: { label }, names: [...names, "exact factor"] },
   );
 };
 
@@ -271,7 +303,7 @@ const ofLattice = (scene, rows) => {
     {
       name: "shapes",
       title: "The sites at three times",
-      svg: frame(shapes.map(shape), { x: { label: "site" }, y: { label: scene.coordinates[0] }, color: legend(shapes.map((row) => `t = ${t(row)}`)) }),
+      svg: frame(shapes.map(shape), { x: { label: "site" }, y: { label: scene.coordinates[0] }, names: shapes.map((row) => `t = ${t(row)}`) }),
     },
     { name: "energy", title: "Energy", svg: againstTime(rows, ["energy"], "energy") },
     { name: "action", title: "Action z", svg: againstTime(rows, ["z"], "z") },
@@ -286,30 +318,40 @@ export const figuresOf = (scene, rows, options) => {
   return ofFormula(scene, rows, options);
 };
 
-/// The area within a closed curve of points that depend smoothly on an angle, up to a factor: by its Fourier coefficients.
+/// The part of the Fourier coefficients of a curve that may be of the highest frequencies: beyond it the points do not resolve the curve.
+const MOST_UNRESOLVED = 1e-6;
+
+/// The area within a closed curve of points that depend smoothly on an angle, the integral of p dq over all coordinates, up to a factor: by
+/// its Fourier coefficients. NaN where the points do not resolve the curve.
 const area = (points) => {
-  const n = points.length;
-  let sum = 0;
-  for (let k = 1; k < n / 2; k++) {
-    let [qc, qs, pc, ps] = [0, 0, 0, 0];
-    points.forEach(([q, p], j) => {
-      const angle = (2 * Math.PI * ((j * k) % n)) / n;
-      const [c, s] = [Math.cos(angle), Math.sin(angle)];
-      qc += q * c;
-      qs += q * s;
-      pc += p * c;
-      ps += p * s;
-    });
-    sum += k * (qc * ps - qs * pc);
+  const [count, n] = [points.length, points[0].length / 2];
+  const waves = Array.from({ length: count }, (_, j) => [Math.cos((2 * Math.PI * j) / count), Math.sin((2 * Math.PI * j) / count)]);
+  let [sum, all, high] = [0, 0, 0];
+  for (let k = 1; k < count / 2; k++) {
+    for (let i = 0; i < n; i++) {
+      let [qc, qs, pc, ps] = [0, 0, 0, 0];
+      for (let j = 0; j < count; j++) {
+        const [c, s] = waves[(j * k) % count];
+        const [q, p] = [points[j][i], points[j][n + i]];
+        qc += q * c;
+        qs += q * s;
+        pc += p * c;
+        ps += p * s;
+      }
+      sum += k * (qc * ps - qs * pc);
+      const size = qc * qc + qs * qs + pc * pc + ps * ps;
+      all += size;
+      if (k > count / 4) high += size;
+    }
   }
-  return sum;
+  return high <= MOST_UNRESOLVED ** 2 * all ? sum : NaN;
 };
 
 /// The positions and momenta of the members of a cloud at a time.
-const cloudAt = ({ numbers, times, members }, time) =>
+const cloudAt = ({ numbers, times, members, dimension }, time) =>
   Array.from({ length: members }, (_, member) => {
-    const at = 2 * (member * times.length + time);
-    return [numbers[at], numbers[at + 1]];
+    const at = 2 * dimension * (member * times.length + time);
+    return numbers.subarray(at, at + 2 * dimension);
   });
 
 /// The figures of a cloud of starts: the cloud at some times, and the area within it against the law of contact flows.
@@ -331,21 +373,21 @@ export const figuresOfCloud = (scene, cloud, peer, coordinate) => {
       title: `${cloud.members} starts on a circle, at five times`,
       svg: frame(
         shown.map((k) =>
-          Plot.line(closed(cloudAt(cloud, k)), { x: (point) => point[0], y: (point) => point[1], stroke: () => `t = ${+cloud.times[k].toPrecision(3)}` }),
+          Plot.line(closed(cloudAt(cloud, k)), { x: (point) => point[coordinate], y: (point) => point[cloud.dimension + coordinate], stroke: () => `t = ${+cloud.times[k].toPrecision(3)}` }),
         ),
-        { x: { label: q }, y: { label: p }, color: legend(shown.map((k) => `t = ${+cloud.times[k].toPrecision(3)}`)) },
+        { x: { label: q }, y: { label: p }, names: shown.map((k) => `t = ${+cloud.times[k].toPrecision(3)}`) },
       ),
     },
     {
       name: "area",
-      title: cloud.is_constant ? "Area within the circle, relative to the first" : "Area within the circle; the rate is not constant, and there is no law for it",
+      title: cloud.is_constant ? "Area within the circle, relative to the first, while 200 points resolve it" : "Area within the circle; the rate is not constant: there is no law",
       svg: frame(
         [
           Plot.line(of("this method", cloud), { x: "t", y: "area", stroke: "name", strokeWidth: 2 }),
           ...(peer ? [Plot.line(of("Runge-Kutta", peer), { x: "t", y: "area", stroke: "name" })] : []),
           ...(cloud.is_constant ? [Plot.line(law, { x: "t", y: "area", stroke: "name", strokeDasharray: DASHED })] : []),
         ],
-        { x: { label: "t" }, y: { label: "area" }, color: legend(names) },
+        { x: { label: "t" }, y: { label: "area" }, names },
       ),
     },
     ...(cloud.is_constant

@@ -221,7 +221,7 @@ const showFigures = (all) => {
     save.onclick = () => saveSvg(figure.name, part.querySelector('svg[role="img"]'));
     title.append(save);
     const picture = figure.svg;
-    const svg = picture.tagName === "svg" ? picture : picture.querySelector(":scope > svg");
+    const svg = picture.tagName === "svg" ? picture : picture.querySelector(":scope > svg:last-of-type");
     svg.setAttribute("role", "img");
     svg.setAttribute("aria-label", figure.title);
     if (figure.start) makeDraggable(svg, picture, figure.start);
