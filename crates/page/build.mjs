@@ -8,7 +8,8 @@ import { fileURLToPath } from "node:url";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const target = process.env.CARGO_TARGET_DIR ?? join(here, "target");
-const file = join(target, "wasm32-unknown-unknown/release/page.wasm");
+const profile = process.argv[2] ?? "release";
+const file = join(target, "wasm32-unknown-unknown", profile, "page.wasm");
 const wasm = readFileSync(file);
 
 const bundle = async (entry) => {
@@ -26,7 +27,7 @@ const bundle = async (entry) => {
 
 // A closing tag within a script would end it.
 const inScript = (text) => text.replaceAll("</script", "<\\/script");
-const engine = execFileSync("zstd", ["--ultra", "-22", "--quiet", "--stdout", file], { maxBuffer: wasm.length });
+const engine = execFileSync("zstd", [...(profile === "release" ? ["--ultra", "-22"] : ["-3"]), "--quiet", "--stdout", file], { maxBuffer: wasm.length });
 const parts = {
   style: readFileSync(join(here, "web/style.css"), "utf8"),
   engine: engine.toString("base64"),

@@ -18,6 +18,7 @@ mod path;
 mod rest;
 mod resting_contact;
 mod rows_beside_kinks;
+mod rows_of_divided_steps;
 mod sensitive;
 mod sensitivity;
 mod sparse;

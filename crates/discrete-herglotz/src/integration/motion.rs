@@ -1,5 +1,6 @@
 //! Quantities of a motion that are computed from its states.
 
+use crate::integration::Piece;
 use crate::run::ResolvedStep;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
 use contact_geom::nalgebra::DMatrix;
@@ -48,6 +49,11 @@ pub(crate) trait Motion {
         _step: (&dyn Stepper, Option<&DenseStep>),
         _near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
+        None
+    }
+
+    /// The same for a piece of a step that was divided.
+    fn resolve_piece(&self, _piece: &Piece, _near: NearbyVelocity<'_>) -> Option<ResolvedStep> {
         None
     }
 }

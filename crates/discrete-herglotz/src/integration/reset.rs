@@ -25,6 +25,8 @@ pub struct Piece {
     pub from: (f64, State),
     /// The time and the state at its end, before anything happens there.
     pub to: (f64, State),
+    /// The logarithms of the conformal factor from the start of the step to its start and to its end.
+    pub log_factors: [f64; 2],
     /// Its dense output, if the integrator provides it.
     pub dense: Option<DenseStep>,
     /// What happens at its start.

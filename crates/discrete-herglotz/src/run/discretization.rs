@@ -2,7 +2,7 @@
 
 use crate::error::step_error;
 use crate::integration::motion::{Motion, NearbyVelocity};
-use crate::integration::{SharedIntegrator, StepEnds, SystemProblem, WholeStep};
+use crate::integration::{Piece, SharedIntegrator, StepEnds, SystemProblem, WholeStep};
 use crate::numbers::state_words::digest;
 use crate::resolution::thresholds::FEW_STAGES;
 use crate::run::observers::output_request::OutputRequest;
@@ -338,5 +338,9 @@ impl Motion for Discretization<'_> {
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
         Discretization::resolve(self, ends, step, near)
+    }
+
+    fn resolve_piece(&self, piece: &Piece, near: NearbyVelocity<'_>) -> Option<ResolvedStep> {
+        Discretization::resolve_piece(self, piece, near)
     }
 }

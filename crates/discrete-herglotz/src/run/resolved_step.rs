@@ -2,6 +2,7 @@
 
 use crate::gauss::{MAX_STAGES, curve_through};
 use crate::integration::motion::{Motion, NearbyVelocity};
+use crate::integration::{Piece, PieceStart};
 use crate::run::discretization::Discretization;
 use crate::{DenseStep, State, Stepper, StepperOptions, Vector};
 use contact_geom::Structure;
@@ -115,8 +116,33 @@ impl<'p> Discretization<'p> {
     /// collocation, if states within a step are to be computed by steps that end there, or if the motion is not resolved.
     pub fn resolve(
         &self,
-        (from, to): (&(f64, State), &(f64, State)),
+        ends: (&(f64, State), &(f64, State)),
         step: (&dyn Stepper, Option<&DenseStep>),
+        near: NearbyVelocity<'_>,
+    ) -> Option<ResolvedStep> {
+        let whole = || Parts::whole(step, self.follows_action(ends));
+        self.resolve_between(ends, (&whole, true), [0.0, step.0.sigma().ln()], near)
+    }
+
+    /// The same for a piece of a step that was divided, with the conformal factor from the start of the step. After the zero of a
+    /// switching function its own polynomial alone is tried: other steps would have to find the side of the motion again.
+    pub fn resolve_piece(&self, piece: &Piece, near: NearbyVelocity<'_>) -> Option<ResolvedStep> {
+        let Piece { from, to, log_factors: [before, after], dense, start } = piece;
+        let whole = || {
+            let curves = vec![dense.clone()?];
+            Some(Parts { curves, log_factors: vec![0.0, after - before], end: to.1.clone() })
+        };
+        let is_divisible = matches!(start, PieceStart::Regular | PieceStart::Reset);
+        self.resolve_between((from, to), (&whole, is_divisible), [*before, *after], near)
+    }
+
+    /// The motion between two states, of which a collocation polynomial may be known, with the logarithms of the conformal factor at
+    /// both.
+    fn resolve_between(
+        &self,
+        (from, to): (&(f64, State), &(f64, State)),
+        (whole, is_divisible): (&dyn Fn() -> Option<Parts>, bool),
+        [before, after]: [f64; 2],
         near: NearbyVelocity<'_>,
     ) -> Option<ResolvedStep> {
         let own = self.info.collocation.filter(|_| !self.needs.exact)?;
@@ -124,16 +150,20 @@ impl<'p> Discretization<'p> {
         let (stages, length) = ((2 * own + 1).min(MAX_STAGES), to.0 - from.0);
         // In transformed time its curve is no polynomial in t.
         let tries_own = own >= MIN_STAGES && !self.info.in_transformed_time;
-        let mut found = if tries_own { Parts::whole(step, with_action) } else { None };
+        let mut found = if tries_own { whole() } else { None };
         // With the most stages the step itself is the first part.
         let mut count = usize::from(tries_own && own == MAX_STAGES);
         let mut v = None;
         loop {
             let excess = found.as_ref().map_or(f64::INFINITY, |parts| self.excess(parts, &to.1, with_action));
-            if let Some(parts) = found.filter(|_| excess <= 1.0) {
-                let of_log_factor = step.0.sigma().ln() - parts.log_factors.last()?;
+            if let Some(mut parts) = found.filter(|_| excess <= 1.0) {
+                let of_log_factor = after - before - parts.log_factors.last()?;
+                parts.log_factors.iter_mut().for_each(|factor| *factor += before);
                 let (difference, order) = (parts.difference(&to.1), self.info.order as i32);
                 return Some(ResolvedStep { parts, t: from.0, length, difference, of_log_factor, order });
+            }
+            if !is_divisible {
+                return None;
             }
             count = next_count(count, excess, stages)?;
             if v.is_none() {

@@ -4,6 +4,7 @@ use crate::integration::motion::Motion;
 use crate::integration::{Piece, PieceStart};
 use crate::run::ResolvedStep;
 use crate::solve::chebyshev::node;
+use crate::switching::stepper::parts::time_spacing;
 use crate::{DenseStep, State, StepError, Stepper, Vector};
 use std::cell::OnceCell;
 
@@ -20,6 +21,12 @@ const MAX_SLOPE_DIFFERENCE: f64 = 1e-4;
 
 /// The relative round-off of a time: a time that differs by less from the end of a step is that end.
 const TIME_ROUND_OFF: f64 = 2.0 * f64::EPSILON;
+
+/// The distance from the ends of a piece within which a time may be that of what happens there, in units of the spacing of times.
+const NEAR_ENDS: f64 = 16.0;
+
+/// The motion in each piece of a step, if its polynomial resolves it; computed on demand.
+type ResolvedPieces = Box<[OnceCell<Option<Box<ResolvedStep>>>]>;
 
 /// The second-order Taylor polynomial of a motion about one of its states, in fractions of a step.
 pub(crate) struct TaylorPolynomial {
@@ -61,6 +68,8 @@ pub struct LastStep<'r> {
     curve: Option<Option<Box<DenseStep>>>,
     /// The motion between the ends, if polynomials resolve it; computed on demand.
     resolved: OnceCell<Option<Box<ResolvedStep>>>,
+    /// The same for each of its pieces; `None` if it is a piece itself.
+    resolved_pieces: Option<OnceCell<ResolvedPieces>>,
     /// The time derivatives of the state at both ends, computed on demand.
     rates: [Option<State>; 2],
 }
@@ -68,8 +77,18 @@ pub struct LastStep<'r> {
 impl<'r> LastStep<'r> {
     /// The step between two times with their states.
     pub(crate) fn new([from, to]: [(f64, State); 2], motion: &'r dyn Motion, stepper: &'r dyn Stepper) -> Self {
-        let resolved = OnceCell::new();
-        LastStep { origin: None, from, to, next: None, motion, stepper, curve: None, resolved, rates: [None, None] }
+        LastStep {
+            origin: None,
+            from,
+            to,
+            next: None,
+            motion,
+            stepper,
+            curve: None,
+            resolved: OnceCell::new(),
+            resolved_pieces: Some(OnceCell::new()),
+            rates: [None, None],
+        }
     }
 
     /// The pieces of this step, in their order, each with what happens at its start; none if it was not divided.
@@ -91,6 +110,7 @@ impl<'r> LastStep<'r> {
                 stepper: self.stepper,
                 curve: Some(piece.dense.clone().map(Box::new)),
                 resolved: OnceCell::new(),
+                resolved_pieces: None,
                 rates: [None, None],
             };
             (piece.start, step)
@@ -139,7 +159,7 @@ impl<'r> LastStep<'r> {
             return Ok((self.to.1.clone(), self.stepper.sigma()));
         }
         let is_inside = (t - self.from.0) * (t - self.to.0) <= 0.0;
-        if is_inside && let Some(resolved) = self.resolved() {
+        if is_inside && let Some(resolved) = self.resolved().or_else(|| self.resolved_piece(t)) {
             let (state, sigma) = resolved.at(t);
             return if state.is_finite() && sigma > 0.0 { Ok((state, sigma)) } else { Err(StepError::NonFinite) };
         }
@@ -168,6 +188,22 @@ impl<'r> LastStep<'r> {
             if self.is_undivided() { found().map(Box::new) } else { None }
         });
         resolved.as_deref()
+    }
+
+    /// The motion in the piece of the step in which a time is, if its polynomial resolves it; `None` at the ends of pieces, where the
+    /// motion may be before or after what happens there.
+    fn resolved_piece(&self, t: f64) -> Option<&ResolvedStep> {
+        let pieces = self.stepper.pieces();
+        let near = NEAR_ENDS * time_spacing(t, self.to.0 - self.from.0);
+        let is_within = |piece: &Piece| {
+            let [from, to] = [&piece.from, &piece.to].map(|end| t - end.0);
+            from * to < 0.0 && from.abs().min(to.abs()) > near
+        };
+        let k = pieces.iter().position(is_within)?;
+        let new = || pieces.iter().map(|_| OnceCell::new()).collect();
+        let resolved = self.resolved_pieces.as_ref()?.get_or_init(new).get(k)?;
+        let near = self.stepper.last_velocity();
+        resolved.get_or_init(|| self.motion.resolve_piece(pieces.get(k)?, near.as_ref()).map(Box::new)).as_deref()
     }
 
     /// Sets the time derivatives at its start, as computed for the preceding step.

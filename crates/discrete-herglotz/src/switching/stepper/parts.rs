@@ -79,7 +79,7 @@ impl<'a> SwitchingStepper<'a> {
             if (t_end - at.t) * span <= 0.0 {
                 // The state after the end of the last part is that of the next step.
                 if start > PieceStart::Zero {
-                    self.add_piece(&at, &at, None, start);
+                    self.add_piece([&at, &at], [sigma; 2], None, start);
                 }
                 return Ok((at, sigma));
             }
@@ -117,10 +117,12 @@ impl<'a> SwitchingStepper<'a> {
                 continue;
             }
             let Some(change) = change else {
+                let before = sigma;
                 sigma *= stepper.stepper().sigma();
                 let stages = self.keep(stepper);
                 let StepCurve { to, dense, .. } = curve;
-                self.add_piece(&at, &to, dense, std::mem::replace(&mut start, PieceStart::Regular));
+                let started = std::mem::replace(&mut start, PieceStart::Regular);
+                self.add_piece([&at, &to], [before, sigma], dense, started);
                 let (next, end) = (to.clone(), plain_end(t));
                 self.ends.push(EndOfPart { from: at, to: to.clone(), next, has_stepper: true, stages, end });
                 (at, longest, changes_at_point) = (to, max_or_nan(2.0 * longest, f64::MIN_POSITIVE).min(span.abs()), 0);
@@ -141,8 +143,10 @@ impl<'a> SwitchingStepper<'a> {
                     continue;
                 }
                 Some(stepper) => {
+                    let before = sigma;
                     sigma *= stepper.stepper().sigma();
-                    self.add_piece(&at, &to, dense, std::mem::replace(&mut start, PieceStart::Zero));
+                    let started = std::mem::replace(&mut start, PieceStart::Zero);
+                    self.add_piece([&at, &to], [before, sigma], dense, started);
                     stages = self.keep(stepper);
                     changes_at_point = 0;
                 }
@@ -219,10 +223,11 @@ impl<'a> SwitchingStepper<'a> {
         }
     }
 
-    /// Adds a part, which may have the length zero, to the pieces of the step.
-    fn add_piece(&mut self, from: &TimedState, to: &TimedState, dense: Option<DenseStep>, start: PieceStart) {
-        let of = |at: &TimedState| (at.t, at.state.clone());
-        self.pieces.push(Piece { from: of(from), to: of(to), dense, start });
+    /// Adds a part, which may have the length zero, to the pieces of the step: its ends, the conformal factors from the start
+    /// of the step to them, its dense output, and what happens at its start.
+    fn add_piece(&mut self, ends: [&TimedState; 2], sigma: [f64; 2], dense: Option<DenseStep>, start: PieceStart) {
+        let [from, to] = ends.map(|at| (at.t, at.state.clone()));
+        self.pieces.push(Piece { from, to, log_factors: sigma.map(f64::ln), dense, start });
     }
 
     /// The part that ends on a zero, to within `spacing` in time; it has no stepper where the zero is the start itself.
