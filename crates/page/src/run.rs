@@ -4,9 +4,7 @@ use crate::numbers::named;
 use crate::recorder::Recorder;
 use crate::request::{By, Deadline, Request, answer, at, of_motion, refusal};
 use crate::runge_kutta;
-use herglotz::runtime::{
-    AnyIntegrator, Body, BodyMotion, Column, Crossing, GroupStatus, Motion, Plan, Status, StepControl, Steps,
-};
+use herglotz::runtime::{Body, BodyMotion, Column, Crossing, GroupStatus, Motion, Plan, Status, StepControl, Steps};
 use herglotz::{AnyScene, BodyScene, LatticeScene, Scene};
 use serde_json::{Value, json};
 
@@ -48,7 +46,7 @@ pub fn columns(scene: &Scene) -> Vec<(String, Column)> {
 
 /// The steps that a plan determined.
 pub fn planned(plan: &Plan) -> Option<StepControl> {
-    let by: AnyIntegrator = plan.integrator.name.parse().ok()?;
+    let by = plan.by()?;
     (!plan.integrator.in_transformed_time).then_some(StepControl::Steps { by, steps: Steps::Count(plan.steps) })
 }
 
@@ -154,6 +152,7 @@ fn of_plan(plan: &Plan) -> Value {
     json!({
         "text": plan.text,
         "integrator": plan.integrator.name,
+        "by": plan.by().map(|by| by.to_string()),
         "step_size": plan.step_size,
         "steps": plan.steps,
         "error": plan.error,

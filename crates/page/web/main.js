@@ -108,7 +108,7 @@ const runOnce = async () => {
     return;
   }
   // While a slider moves, the steps are those of the run before.
-  const planned = isDragging && answer?.plan ? { steps: [answer.plan.integrator, answer.plan.steps] } : {};
+  const planned = isDragging ? stepsOf(answer) : {};
   if (!isDragging) status.textContent = "Running.";
   const began = performance.now();
   const found = await engine.call("run", { ...request, ...planned });
@@ -127,6 +127,9 @@ const runOnce = async () => {
   if (!isDragging && element("cloud").checked && scene.kind === "motion") await runCloud(request, found.evaluations);
   if (!isDragging && scene.kind === "motion" && !isWanted) await runCheck(request);
 };
+
+/// The steps of a run, by which it can be repeated.
+const stepsOf = (of) => (of?.plan?.by ? { steps: [of.plan.by, of.plan.steps] } : {});
 
 /// Shows the error of an answer, if it is one.
 const refused = (found) => {
@@ -177,7 +180,7 @@ const radius = (name) => {
 
 /// Adds the defect of the contact form to the plan.
 const runCheck = async (request) => {
-  const found = await engine.call("check", { ...request, steps: answer.plan && [answer.plan.integrator, answer.plan.steps] });
+  const found = await engine.call("check", { ...request, ...stepsOf(answer) });
   if (found.error || found.stopped || found.fault || found.contact_defect === null) return;
   const lines = [
     `a step at t = ${found.t}: sigma_d = ${found.sigma}`,
@@ -278,7 +281,7 @@ let shown = "";
 
 const showControls = () => {
   const names = [...Object.keys(scene.parameters), ...Object.keys(scene.start).map((name) => `start.${name}`)];
-  const key = JSON.stringify([names, scene.integrators?.length, scene.kind, sceneText.value]);
+  const key = JSON.stringify([names, scene.integrators?.length, scene.kind, Object.keys(scene.control), sceneText.value]);
   if (key === shown) return;
   shown = key;
   const values = { ...scene.parameters, ...Object.fromEntries(Object.entries(scene.start).map(([name, x]) => [`start.${name}`, x])) };

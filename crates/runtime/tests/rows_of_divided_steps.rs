@@ -1,5 +1,7 @@
 //! Rows of steps that are divided at kinks, jumps and resets: on polynomials, as accurate as by steps that end there.
 
+#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+
 use formula_lagrangian::{Direction, Formula, Reset};
 use herglotz_runtime::{AnyIntegrator, Column, Motion, OutputTimes, Start, StepControl, Steps, System};
 
