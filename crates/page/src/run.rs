@@ -114,7 +114,6 @@ fn of_body(scene: &BodyScene) -> Result<Value, Value> {
         "of_events": Body::COLUMNS,
         "plan": of_plan(&plan),
         "steps": outcome.steps,
-        "tip": scene.body.tip(),
         "gamma": scene.body.gamma,
     });
     merge(&mut answer, more);
@@ -132,7 +131,6 @@ fn of_lattice(scene: &LatticeScene) -> Result<Value, Value> {
     let more = json!({
         "columns": scene.columns(),
         "of_events": [],
-        "sizes": scene.sizes,
         "steps": outcome.steps,
         "evaluations": outcome.evaluations,
     });

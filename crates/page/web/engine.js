@@ -44,10 +44,6 @@ export class Engine {
     });
   }
 
-  get isBusy() {
-    return this.#open.size > 0;
-  }
-
   /// Ends all that is computed. What was computed of it is in the answers, which have `stopped`.
   stop() {
     this.#worker.terminate();

@@ -8,7 +8,7 @@ const save = (name, text, type) => {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 };
 
-export const csvOf = (rows, columns) => {
+const csvOf = (rows, columns) => {
   const of = columns.map((name) => rows.column(name));
   const quoted = columns.map((name) => (/[",]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name));
   const lines = [quoted.join(",")];

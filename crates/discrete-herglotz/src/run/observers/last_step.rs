@@ -202,8 +202,11 @@ impl<'r> LastStep<'r> {
         let k = pieces.iter().position(is_within)?;
         let new = || pieces.iter().map(|_| OnceCell::new()).collect();
         let resolved = self.resolved_pieces.as_ref()?.get_or_init(new).get(k)?;
-        let near = self.stepper.last_velocity();
-        resolved.get_or_init(|| self.motion.resolve_piece(pieces.get(k)?, near.as_ref()).map(Box::new)).as_deref()
+        let found = || {
+            let near = self.stepper.last_velocity();
+            self.motion.resolve_piece(pieces.get(k)?, near.as_ref()).map(Box::new)
+        };
+        resolved.get_or_init(found).as_deref()
     }
 
     /// Sets the time derivatives at its start, as computed for the preceding step.
