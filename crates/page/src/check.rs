@@ -5,7 +5,7 @@ use crate::request::{Deadline, answer, of_motion};
 use herglotz::runtime::{Motion, StepControl, Steps};
 use serde_json::{Value, json};
 
-/// The defect of the contact form of a step at the end of a motion: the step is a contact transformation where it is of the size of
+/// The defect of the contact form of the first step of a motion: the step is a contact transformation where it is of the size of
 /// round-off.
 pub fn check(request: &str) -> Value {
     answer(request, |request| {
