@@ -1,5 +1,5 @@
-//! A global allocator that counts. It is global to its binary, so that tests that count are in a file of their own,
-//! which includes this one. The program `scale` has an allocator of its own, since it counts over all threads.
+//! A global allocator that counts, for each thread by itself: tests that run beside each other in one binary do not disturb each
+//! other. The program `scale` has an allocator of its own, since it counts over all threads.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

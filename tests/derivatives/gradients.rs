@@ -9,6 +9,7 @@ pub mod impacts;
 pub mod invalid_input;
 mod losses;
 mod lyapunov;
+mod memory;
 mod pendulum;
 mod runs;
 pub mod switches;

@@ -7,6 +7,10 @@
 // In a test a missing value is a failure.
 #![allow(clippy::panic, clippy::unwrap_used)]
 
+// Other targets use the rest of it.
+#[allow(dead_code)]
+#[path = "../common/counting_allocator.rs"]
+mod counting_allocator;
 mod discrete_tangents;
 mod gradients;
 mod lagrangians;

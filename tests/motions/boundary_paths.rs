@@ -4,6 +4,7 @@
 pub mod conjugate_points;
 pub mod end_conditions;
 mod equations;
+mod exact_paths;
 pub mod forces;
 mod several_paths;
 

@@ -3,6 +3,7 @@
 mod failures;
 mod resolution;
 mod rows;
+mod sharded;
 mod single_runs;
 pub mod systems;
 

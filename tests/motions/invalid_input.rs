@@ -3,6 +3,7 @@
 
 pub mod discrete;
 mod entries;
+mod exact;
 mod geometry;
 pub mod known_issues;
 pub mod numbers;

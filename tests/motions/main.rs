@@ -13,6 +13,10 @@
 #[allow(dead_code)]
 #[path = "../common/mod.rs"]
 mod common;
+// Other targets use the rest of it.
+#[allow(dead_code)]
+#[path = "../common/counting_allocator.rs"]
+mod counting_allocator;
 
 mod any_system;
 mod boundary_paths;
@@ -22,6 +26,7 @@ mod integrators;
 mod invalid_input;
 mod lagrangians;
 mod motions;
+mod no_allocation;
 mod paper;
 mod path_branches;
 mod resets;

@@ -51,8 +51,6 @@
 //! Cost: `L_h^e` with its first derivatives costs 1.2 to 3.5 times the computation of the motion alone by dop853 to
 //! 1e-13. No memory is allocated for static N.
 
-#[cfg(test)]
-mod bad_numbers;
 mod contact;
 mod error;
 pub mod groups;

@@ -13,6 +13,7 @@ mod hamiltonians;
 mod impacts;
 mod invalid_input;
 mod language;
+mod no_allocation;
 mod own_systems;
 mod parametric;
 mod random;

@@ -1,7 +1,4 @@
-//! A formula and its derivatives are evaluated without allocation. A counting allocator is global to its binary, so
-//! this test is in a file of its own.
-
-#![allow(clippy::unwrap_used)] // Tests unwrap, in helpers too.
+//! A formula and its derivatives are evaluated without allocation.
 
 #[allow(dead_code)] // Other binaries use the rest of it.
 #[path = "../../../tests/common/counting_allocator.rs"]

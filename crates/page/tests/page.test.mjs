@@ -85,6 +85,21 @@ test("the numbers are those of the program", { skip: existsSync(program) ? false
   });
 });
 
+test("a figure is saved as a picture that stands by itself", async () => {
+  await withPage(async (page) => {
+    for (const name of await page.$$eval("#figures figure[data-name]", (all) => all.map((figure) => figure.dataset.name))) {
+      const svg = await saved(page, `#figures figure[data-name="${name}"] button`);
+      assert.match(svg, /^<svg [^>]*xmlns="http:\/\/www\.w3\.org\/2000\/svg"/, name);
+      assert.doesNotMatch(svg, /var\(|NaN|Infinity/, name);
+      const picture = await page.evaluate((text) => {
+        const read = new DOMParser().parseFromString(text, "image/svg+xml");
+        return { error: read.querySelector("parsererror")?.textContent ?? "", marks: read.querySelectorAll("path[d], circle").length, texts: read.querySelectorAll("text").length };
+      }, svg);
+      assert.ok(picture.error === "" && picture.marks > 0 && picture.texts > 4, `${name}: ${JSON.stringify(picture)}`);
+    }
+  });
+});
+
 test("a Lagrangian that is typed runs", async () => {
   await withPage(async (page) => {
     await page.fill("#lagrangian", "m*x'^2/2 - k*x^4/4 + gamma*z");
@@ -218,7 +233,7 @@ test("forces, backward time, the cloud and the Runge-Kutta method", async () => 
       all.map((path) => Number(path.getAttribute("d").split(",").at(-1))),
     );
     assert.ok(heights.length === 2 && heights[0] - heights[1] > 40, `${heights}`);
-    assert.match(await page.textContent("#plan"), /the defect of the contact form is \d\.\de-1\d/);
+    assert.match(await page.textContent("#plan"), /the last step, from t = 99: [^]*the defect of the contact form is \d\.\de-1\d/);
     await page.click("#backward");
     await ended(page);
     assert.match(await statusOf(page), /^completed/);

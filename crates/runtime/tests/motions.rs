@@ -16,6 +16,8 @@ mod dimensions;
 mod ensembles;
 #[path = "motions/ensembles_own_steps.rs"]
 mod ensembles_own_steps;
+#[path = "motions/geometry.rs"]
+mod geometry;
 #[path = "motions/hamiltonian_derivatives.rs"]
 mod hamiltonian_derivatives;
 #[path = "motions/hamiltonians.rs"]

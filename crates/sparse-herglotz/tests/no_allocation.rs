@@ -1,9 +1,6 @@
 //! Steps of sparse systems do not allocate, except for new factorisations; and the memory of a long chain is
 //! bounded.
 
-// A failed `unwrap` is a failure of the test.
-#![allow(clippy::unwrap_used)]
-
 #[path = "../../../tests/common/counting_allocator.rs"]
 mod counting_allocator;
 

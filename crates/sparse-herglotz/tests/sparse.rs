@@ -12,6 +12,7 @@ mod flags;
 mod friction;
 mod gauss;
 mod matrix_free;
+mod no_allocation;
 mod rods;
 mod small_systems;
 mod theory;

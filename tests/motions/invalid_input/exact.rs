@@ -1,12 +1,16 @@
-//! Every public function with arguments that are NaN, infinite, tiny, zero or huge: each call returns an error or a
+//! Every public function of exact-lagrangian with arguments that are NaN, infinite, tiny, zero or huge: each call returns an error or a
 //! result without NaN, does not panic, and does a bounded amount of work.
 
-use crate::principle::{Curve, MotionCurve, NonHolonomic, SplineCurve, action, action_derivative};
-use crate::*;
-use contact_examples::systems::{HarmonicOscillator, Pendulum};
+use crate::lagrangians::{One, one};
+use contact_examples::systems::{HarmonicOscillator, OneCoordinate, Pendulum};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, PhasePoint, VelocityPoint};
 use discrete_herglotz::{DiscreteLagrangian, rules::Rule, solve::Solver};
+use exact_lagrangian::principle::{Curve, MotionCurve, NonHolonomic, SplineCurve, action, action_derivative};
+use exact_lagrangian::{
+    ContactExponential, ExactError, ExactLagrangian, QuadraticExact, compose, error_orders, herglotz_flow, statements,
+    through,
+};
 use std::fmt::Debug;
 
 /// The debug output of a result, in which a NaN can be found.
@@ -16,7 +20,7 @@ fn described<A: Debug, E: Debug>(answer: Result<A, E>) -> Option<String> {
 
 type Call = (&'static str, fn([f64; 5]) -> Option<String>);
 
-const SYSTEM: Pendulum = Pendulum { gamma: -0.1 };
+const SYSTEM: One = One::Catalogue(OneCoordinate::Pendulum(Pendulum { gamma: -0.1 }));
 
 fn start([_, _, q, v, z]: [f64; 5]) -> VelocityPoint<1> {
     VelocityPoint::new([q], [v], z)
@@ -30,11 +34,11 @@ fn phase([_, _, q, p, z]: [f64; 5]) -> PhasePoint<1> {
     PhasePoint::new([q], [p], z)
 }
 
-fn exponential(h: f64) -> Result<ContactExponential<Pendulum>, ExactError<1>> {
+fn exponential(h: f64) -> Result<ContactExponential<One>, ExactError<1>> {
     Ok(ContactExponential::new(SYSTEM, h)?)
 }
 
-fn exact(h: f64) -> Result<ExactLagrangian<Pendulum, 1>, ExactError<1>> {
+fn exact(h: f64) -> Result<ExactLagrangian<One, 1>, ExactError<1>> {
     Ok(ExactLagrangian::new(SYSTEM, h)?)
 }
 
@@ -59,11 +63,11 @@ const CALLS: &[Call] = &[
         exact(a[1]).ok().and_then(|e| described(e.backward(a[0], &phase(a), &[a[3]].into(), &mut Solver::default())))
     }),
     ("quadratic value", |a| {
-        QuadraticExact::new(&HarmonicOscillator { gamma: -0.1 }, a[1])
+        QuadraticExact::new(&one(HarmonicOscillator { gamma: -0.1 }), a[1])
             .ok()
             .and_then(|l| described(l.value(a[0], &points(a))))
     }),
-    ("quadratic drag", |a| described(QuadraticExact::new(&HarmonicOscillator { gamma: a[3] }, a[1]))),
+    ("quadratic drag", |a| described(QuadraticExact::new(&one(HarmonicOscillator { gamma: a[3] }), a[1]))),
     ("chetaev", |a| {
         let system = NonHolonomic::new(SYSTEM);
         described(system.chetaev(a[0], &system.lift(a[0], &start(a))))

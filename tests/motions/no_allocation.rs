@@ -2,74 +2,31 @@
 //! steps of contact Gauss collocation, the exact discrete Lagrangian with its derivatives, a correction of a path,
 //! a step of an ensemble, and steps on groups and under constraints.
 
-// In a test a missing value is a failure.
-#![allow(clippy::unwrap_used)]
-
-// Other binaries use the rest of it.
-#[allow(dead_code)]
-#[path = "common/counting_allocator.rs"]
-mod counting_allocator;
-// Other binaries use the rest of it.
-#[allow(dead_code)]
-#[path = "common/gauss.rs"]
-mod gauss_steppers;
-
+use crate::common::gauss::GaussSteppers;
+use crate::common::lagrangians::WithStructure;
+use crate::counting_allocator::allocations;
+use crate::lagrangians::{One, Two, kepler, one, two};
 use contact_examples::systems::constrained::{KnifeEdge, RigidPendulum};
-use contact_examples::systems::{DoublePendulum, HarmonicOscillator, Kepler, Pendulum, QuadraticInZ, System};
+use contact_examples::systems::{
+    DoublePendulum, HarmonicOscillator, Kepler, OneCoordinate, Pendulum, QuadraticInZ, System,
+};
 use contact_geom::groups::{Inertia, LieGroup, RigidBody, Rotations, UniformGravity};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{
-    ContactHamiltonian, Lagrangian, OfHamiltonian, Parametric, PhasePoint, Scalar, VelocityPoint, lagrangian_enum,
-    legendre,
+    ContactHamiltonian, Lagrangian, OfHamiltonian, PhasePoint, Scalar, Structure, VelocityPoint, legendre,
 };
-use counting_allocator::{allocations, peak};
-use discrete_herglotz::ensemble::Lagrangians;
 use discrete_herglotz::{
     DiscreteLagrangian, Ensemble, GaussCollocation, Problem, SplittingScheme, Stepper, StepperOptions, Steps, Until,
     boundary::{BoundaryPath, End},
     constraints::{ConstrainedStart, ContactLobatto, DragRattle, Nonholonomic},
+    ensemble::Lagrangians,
     gauss::{Gauss, GaussRoute, GaussStepper},
     groups::{GroupGauss, GroupMotion, GroupState, RigidBodySplitting},
     rules::{Flow, Method, Rule},
-    sensitivity::{EndState, Loss},
 };
 use exact_lagrangian::{ContactExponential, ExactLagrangian, RetractionRoute};
-use gauss_steppers::GaussSteppers;
 
-lagrangian_enum! {
-    /// Lagrangians with one coordinate.
-    #[derive(Clone, Copy)]
-    enum One<1> {
-        HarmonicOscillator(HarmonicOscillator),
-        Pendulum(Pendulum),
-        QuadraticInZ(QuadraticInZ),
-        Unclaimed(Unclaimed),
-    }
-}
-lagrangian_enum!(parametric One<1> { HarmonicOscillator, Pendulum, QuadraticInZ, Unclaimed });
-
-lagrangian_enum! {
-    /// Lagrangians with two coordinates.
-    #[derive(Clone, Copy)]
-    enum Two<2> {
-        DoublePendulum(DoublePendulum),
-        Kepler(Kepler<2>),
-    }
-}
-
-/// A pendulum that declares no structure.
-#[derive(Clone, Copy)]
-struct Unclaimed;
-
-impl Lagrangian<1> for Unclaimed {
-    fn value<T: Scalar>(&self, _t: T, q: &SVector<T, 1>, v: &SVector<T, 1>, z: T) -> T {
-        v[0] * v[0] * 0.5 + q[0].cos() - z * 0.001
-    }
-}
-
-impl Parametric<1> for Unclaimed {}
-
-/// A system of the catalogue as a Lagrangian of these types, with its name and its initial data.
+/// A system of the catalogue as a Lagrangian of these tests, with its name and its initial data.
 struct Case<L, const N: usize> {
     name: &'static str,
     lagrangian: L,
@@ -77,12 +34,28 @@ struct Case<L, const N: usize> {
 }
 
 impl<L, const N: usize> Case<L, N> {
-    fn of<S: System<N>>(system: S) -> Self
-    where
-        L: From<S>,
-    {
-        Case { name: system.name(), initial: system.initial(), lagrangian: system.into() }
+    fn of<S: System<N>>(system: S, lagrangian: L) -> Self {
+        Case { name: system.name(), initial: system.initial(), lagrangian }
     }
+}
+
+/// The pendulum without its structure.
+fn unclaimed() -> One {
+    WithStructure(OneCoordinate::from(Pendulum { gamma: -0.001 }), Structure::default()).into()
+}
+
+/// A system with one coordinate.
+fn of_one<S: System<1> + Copy + Into<OneCoordinate>>(system: S) -> Case<One, 1> {
+    Case::of(system, one(system))
+}
+
+fn double_pendulum() -> Case<Two, 2> {
+    Case::of(DoublePendulum::default(), two(DoublePendulum::default()))
+}
+
+/// In space, where it is a type of its own.
+fn kepler_in_space() -> Case<Kepler<3>, 3> {
+    Case::of(Kepler::default(), Kepler::default())
 }
 
 /// The counter counts.
@@ -107,9 +80,9 @@ fn steps() {
             assert_eq!((outcome, count), (Ok(()), 0), "{name}");
         }
     }
-    run(Case::<One, 1>::of(Pendulum::default()));
-    run(Case::<Two, 2>::of(DoublePendulum::default()));
-    run(Case::<Kepler<3>, 3>::of(Kepler::default()));
+    run(of_one(Pendulum::default()));
+    run(double_pendulum());
+    run(kepler_in_space());
 }
 
 /// Steps so long that Newton's method is used: its workspace is allocated in the first one.
@@ -125,8 +98,8 @@ fn collocation_by_newton() {
         assert_eq!((outcome, count), (Ok(()), 0), "{expected:?}");
         assert!(stepper.newton_steps() > 1, "{expected:?}");
     }
-    run(Pendulum { gamma: -0.001 }.into(), GaussRoute::Condensed);
-    run(Unclaimed.into(), GaussRoute::General);
+    run(one(Pendulum { gamma: -0.001 }), GaussRoute::Condensed);
+    run(unclaimed(), GaussRoute::General);
 }
 
 /// A thousand steps of contact Gauss collocation by each of its routes, with extrapolated starts and updated slopes.
@@ -142,11 +115,11 @@ fn collocation() {
         let found = (outcome, count, stepper.route(), stepper.newton_steps());
         assert_eq!(found, (Ok(()), 0, expected, 0), "{}", case.name);
     }
-    run(Case::<One, 1>::of(HarmonicOscillator::default()), 0.1, GaussRoute::Linear);
-    run(Case::<One, 1>::of(Pendulum::default()), 0.1, GaussRoute::Condensed);
-    run(Case::<Kepler<3>, 3>::of(Kepler::default()), 0.05, GaussRoute::Condensed);
-    run(Case::<One, 1>::of(QuadraticInZ::default()), 0.1, GaussRoute::ConstantMass);
-    run(Case::<Two, 2>::of(DoublePendulum::default()), 0.02, GaussRoute::General);
+    run(of_one(HarmonicOscillator::default()), 0.1, GaussRoute::Linear);
+    run(of_one(Pendulum::default()), 0.1, GaussRoute::Condensed);
+    run(kepler_in_space(), 0.05, GaussRoute::Condensed);
+    run(of_one(QuadraticInZ::default()), 0.1, GaussRoute::ConstantMass);
+    run(double_pendulum(), 0.02, GaussRoute::General);
 }
 
 /// Steps for a contact Hamiltonian: by fixed-point iteration, and so long that Newton's method is used.
@@ -197,17 +170,17 @@ fn exact() {
         assert!(all.1.is_some() && all.2.is_some() && all.3.is_some());
         assert_eq!((all.0.map(|r| r.route), count), (Some(expected), 0), "{}", case.name);
     }
-    run(Case::<One, 1>::of(Pendulum::default()), 0.5, RetractionRoute::Collocation);
-    run(Case::<Two, 2>::of(DoublePendulum::default()), 0.1, RetractionRoute::Collocation);
-    run(Case::<Kepler<3>, 3>::of(Kepler::default()), 0.1, RetractionRoute::Collocation);
-    run(Case::<Two, 2>::of(Kepler::<2>::default()), 1.0, RetractionRoute::Collocation);
-    run(Case::<One, 1>::of(HarmonicOscillator::default()), 3.0, RetractionRoute::Newton);
+    run(of_one(Pendulum::default()), 0.5, RetractionRoute::Collocation);
+    run(double_pendulum(), 0.1, RetractionRoute::Collocation);
+    run(kepler_in_space(), 0.1, RetractionRoute::Collocation);
+    run(Case::of(Kepler::default(), kepler(Kepler::default())), 1.0, RetractionRoute::Collocation);
+    run(of_one(HarmonicOscillator::default()), 3.0, RetractionRoute::Newton);
 }
 
 /// A search with several corrections allocates as much as one that starts at its solution: its workspace.
 #[test]
 fn corrections_of_paths() {
-    let ld = Rule::LEFT_MIDPOINT.of(One::from(Pendulum { gamma: -0.1 }), 0.02).unwrap();
+    let ld = Rule::LEFT_MIDPOINT.of(one(Pendulum { gamma: -0.1 }), 0.02).unwrap();
     let problem = BoundaryPath::new(&ld, 100, [0.0, 1.0].map(|q| End::Position([q].into()))).unwrap();
     let (mut far, mut near) = (None, None);
     let many = allocations(|| far = Some(problem.search()));
@@ -227,7 +200,7 @@ fn corrections_of_paths() {
 /// In lanes an ensemble allocates as much for many steps as for few, by splittings and by collocation.
 #[test]
 fn steps_of_ensembles() {
-    let pendulum = One::from(Pendulum { gamma: -0.01 });
+    let pendulum = one(Pendulum { gamma: -0.01 });
     let start = |i: usize| VelocityPoint::new([0.01 * i as f64], [0.5], 0.0);
     let of = |ensemble: Ensemble<'_, Lagrangians<'_, One, 1>>, steps: usize| {
         let ensemble = ensemble.steps(Steps::Count(steps)).threads(1);
@@ -245,34 +218,6 @@ fn steps_of_ensembles() {
         of(collocation(), 10);
         assert_eq!(of(collocation(), steps), of(collocation(), 100));
     }
-}
-
-/// The memory of a gradient is bounded: the stages of steps are kept if they are few, else states at intervals, which are
-/// doubled when there are too many. The steps themselves allocate nothing, so that the number of allocations grows with the
-/// kept states alone.
-#[test]
-fn gradients_have_bounded_memory() {
-    struct End;
-    impl Loss<1> for End {
-        fn value<T: Scalar>(&self, end: &EndState<1, T>) -> T {
-            end.q[0] * end.v[0]
-        }
-    }
-    let pendulum = One::from(Pendulum::default());
-    let problem = Problem::new(&pendulum, 0.0, Pendulum::default().initial()).unwrap();
-    let gradient = |steps: usize| {
-        let run = problem.by(GaussCollocation { stages: 4 }).steps(Steps::Size(1e-3));
-        let found = run.gradient(&End, Until::Time(1e-3 * steps as f64)).unwrap();
-        assert!(found.loss.is_some() && found.outcome.steps == steps);
-    };
-    let count = |steps: usize| allocations(|| gradient(steps));
-    // A state is kept after each 64 steps, in at most 8 allocations; one in each step would be 64.
-    let (few, more) = (count(64 * 16), count(64 * 32));
-    assert!(more <= few + 8 * 16, "{few} and {more} allocations");
-    // With 4 stages, 21 numbers of each step are kept of up to 199,728 steps.
-    assert!(peak(|| gradient(199_000)) < 34 << 20);
-    let (few, many) = (peak(|| gradient(200_000)), peak(|| gradient(800_000)));
-    assert!(many <= few + few / 4 && many < 4 << 20, "{few} and {many} bytes");
 }
 
 /// Steps on a Lie group and under constraints; the first one may allocate its workspace.

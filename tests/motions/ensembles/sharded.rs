@@ -1,23 +1,21 @@
 //! Tests of ensembles in shards: merged in any order they are bitwise equal to one run, and a checkpoint with missing
 //! shards can be resumed.
 
-// In a test a failing `unwrap` is a test failure.
-#![allow(clippy::unwrap_used)]
-
-use contact_examples::systems::Pendulum;
+use crate::lagrangians::One;
+use contact_examples::systems::{OneCoordinate, Pendulum};
 use contact_geom::VelocityPoint;
 use discrete_herglotz::{
     CheckpointError, Ensemble, SplittingScheme, Steps, Until,
     ensemble::{EnsembleError, Lagrangians, Tally},
 };
 
-const PENDULUM: Pendulum = Pendulum { gamma: -0.1 };
+const PENDULUM: One = One::Catalogue(OneCoordinate::Pendulum(Pendulum { gamma: -0.1 }));
 const UNTIL: Until = Until::Time(2.0);
 
 /// The number of members: six shards, the last one not full. A member of the third shard has an invalid initial state.
 const COUNT: usize = 2000;
 
-fn ensemble(steps: usize) -> Ensemble<'static, Lagrangians<'static, Pendulum, 1>> {
+fn ensemble(steps: usize) -> Ensemble<'static, Lagrangians<'static, One, 1>> {
     let start = |i: usize| {
         let angle = if i == 900 { f64::NAN } else { 0.001 * i as f64 };
         VelocityPoint::new([angle], [0.5], 0.1)
@@ -26,14 +24,14 @@ fn ensemble(steps: usize) -> Ensemble<'static, Lagrangians<'static, Pendulum, 1>
 }
 
 /// All members as text, and the tally.
-fn plain(of: &Ensemble<'_, Lagrangians<'_, Pendulum, 1>>) -> (Vec<String>, Tally) {
+fn plain(of: &Ensemble<'_, Lagrangians<'_, One, 1>>) -> (Vec<String>, Tally) {
     let mut all = Vec::new();
     let tally = of.run(UNTIL, |member| all.push(format!("{member:?}"))).unwrap();
     (all, tally)
 }
 
 /// The same from shards that are added in the given order.
-fn merged(of: &Ensemble<'_, Lagrangians<'_, Pendulum, 1>>, order: &[usize]) -> (Vec<String>, Tally) {
+fn merged(of: &Ensemble<'_, Lagrangians<'_, One, 1>>, order: &[usize]) -> (Vec<String>, Tally) {
     let (sharded, mut all) = (of.in_shards(UNTIL).unwrap(), Vec::new());
     let mut fold = |member: &_| all.push(format!("{member:?}"));
     let mut merge = of.merge(&sharded, &mut fold).unwrap();
@@ -143,7 +141,7 @@ fn the_window_is_bounded_without_a_checkpoint() {
 #[test]
 fn fingerprints_tell_ensembles_apart() {
     let fingerprint =
-        |of: Ensemble<'static, Lagrangians<'static, Pendulum, 1>>, until| of.in_shards(until).unwrap().fingerprint();
+        |of: Ensemble<'static, Lagrangians<'static, One, 1>>, until| of.in_shards(until).unwrap().fingerprint();
     let first = fingerprint(ensemble(20), UNTIL);
     assert_eq!(fingerprint(ensemble(20).threads(1), UNTIL), first);
     let others = [
