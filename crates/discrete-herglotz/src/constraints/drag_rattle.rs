@@ -1,5 +1,6 @@
 //! RATTLE with a linear drag, and its compositions.
 
+use super::factored::Factored;
 use super::start::inverse_mass;
 use super::variation::{Unvaried, Vary};
 use super::{ConstrainedStart, Corrections, Progress};
@@ -11,7 +12,7 @@ use contact_geom::constraints::{ConstrainedMotion, Constraint, ConstraintDerivat
 use contact_geom::nalgebra::{SMatrix, SVector};
 use contact_geom::numbers::MaxAbsOrNan;
 use contact_geom::numbers::dot;
-use contact_geom::support::{independent_rows, least_norm, linear::solve, restricted};
+use contact_geom::support::{independent_rows, least_norm, restricted};
 use contact_geom::{ChartVector, Derivatives, GeometryError, Lagrangian, PhasePoint, Scalar, VelocityPoint};
 
 /// RATTLE between two halves of a linear drag, `D_(h/2) o RATTLE_h o D_(h/2)`, and its symmetric compositions of order
@@ -203,9 +204,9 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         loop {
             q = q0 + self.velocity(t, (&q0, &p), vary) * T::from(h);
             (c, g) = vary.constraint(&self.constraint, &q);
-            let matrix = inverted(restricted(g.map(|e| e.re()) * responses * h, &kept))?;
+            let matrix = Factored::new(restricted(g.map(|e| e.re()) * responses * h, &kept))?;
             mask(&mut c, &kept);
-            let impulse = times(&matrix, &c);
+            let impulse = matrix.solve(&c);
             let push = g0.transpose() * impulse;
             p -= push;
             step.impulse -= impulse;
@@ -222,12 +223,12 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         p += force * half;
         z += value * half;
         let real = g.map(|e| e.re());
-        let matrix = inverted(restricted(real * self.inverse * real.transpose(), &kept))?;
+        let matrix = Factored::new(restricted(real * self.inverse * real.transpose(), &kept))?;
         // The second pass completes the derivatives of dual numbers, the third removes round-off.
         for _ in 0..3 {
             let mut normal = g * self.velocity(t, (&q, &p), vary);
             mask(&mut normal, &kept);
-            let impulse = times(&matrix, &normal);
+            let impulse = matrix.solve(&normal);
             p -= g.transpose() * impulse;
             step.impulse -= impulse;
         }
@@ -392,13 +393,4 @@ fn mask<T: Scalar, const M: usize>(x: &mut SVector<T, M>, kept: &[bool; M]) {
             x[a] = T::zero();
         }
     }
-}
-
-/// The inverse of a small matrix.
-fn inverted<const M: usize>(matrix: SMatrix<f64, M, M>) -> Result<SMatrix<f64, M, M>, StepError> {
-    let mut inverse = SMatrix::<f64, M, M>::identity();
-    for mut column in inverse.column_iter_mut() {
-        solve(&mut matrix.clone_owned(), &mut column).map_err(|e| StepError::Singular { pivot: e.pivot })?;
-    }
-    Ok(inverse)
 }
