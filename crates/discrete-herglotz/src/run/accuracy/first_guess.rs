@@ -20,6 +20,9 @@ const MAX_CHANGE_OF_CONSTANT_MASS: f64 = 64.0 * f64::EPSILON;
 /// such a rate decreases.
 const MAX_DAMPING: f64 = 2.0;
 
+/// The smallest relative error for which steps are estimated: below the rounding of one number, shorter steps do not help.
+const SMALLEST_ERROR: f64 = f64::EPSILON / 16.0;
+
 /// The number of steps for which the motion linearised at its start has a given error. It is too small if nonlinear
 /// terms lead to higher frequencies.
 pub(crate) fn first_guess(request: &Request<'_>, stages: usize, goal: f64) -> usize {
@@ -60,7 +63,7 @@ pub(crate) fn first_guess(request: &Request<'_>, stages: usize, goal: f64) -> us
 /// `x^(2s+1) s!^4 / (2s)!^3`; half of x is taken, since for steps longer than half a period the fixed-point iteration does
 /// not contract.
 fn radians(stages: usize, goal: f64) -> f64 {
-    let s = stages as f64;
+    let (s, goal) = (stages as f64, max_or_nan(goal, SMALLEST_ERROR));
     let logarithm = |n: usize| (1..=n).map(|i| (i as f64).ln()).sum::<f64>();
     let constant = 4.0 * logarithm(stages) - 3.0 * logarithm(2 * stages);
     0.5 * ((goal.ln() - constant) / (2.0 * s + 1.0)).exp()
