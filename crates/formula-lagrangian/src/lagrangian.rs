@@ -3,8 +3,7 @@
 use crate::derived::Derived;
 use crate::drag::ProvedForce;
 use crate::evaluation::{At, whole, whole_vector};
-use crate::forces::Work;
-use crate::{Formula, FormulaDerivatives, FormulaError};
+use crate::{Formula, FormulaDerivatives, FormulaError, FormulaSymmetry};
 use contact_geom::nalgebra::{ArrayStorage, SMatrix, SVector};
 use contact_geom::switching::Control;
 use contact_geom::{
@@ -136,42 +135,22 @@ impl<const N: usize> FormulaLagrangian<N> {
         self.derived().constant_rate()
     }
 
-    /// The detected symmetries, whose momenta are multiplied by the conformal factor: translations along a coordinate
-    /// on which L does not depend; rotations of two coordinates that occur in L only in squares of lengths, scalar
-    /// products and areas, such as `x^2 + y^2`; and common translations and rotations of bodies, whose coordinates are
-    /// those with differences in L, such as `x1 - x2` and `y1 - y2`, in their order. With forces, they are those along
-    /// which the forces do no work, as far as their expressions show: the forces on the coordinates that are moved are
-    /// 0, or cancel as `F` and `-F`; with constraints, they are those under which each constraint is invariant, as far as
-    /// its expression shows. With resets, which change momenta, there are none.
+    /// The derivatives that it evaluates, over N coordinates.
+    pub fn derivatives(&self) -> &FormulaDerivatives {
+        &self.derivatives
+    }
+
+    /// The [detected symmetries](FormulaDerivatives::symmetries).
     pub fn symmetries(&self) -> Vec<Symmetry<N>> {
-        let along =
-            |set: &[usize]| Symmetry::Translation(SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 }));
-        if self.resets() > 0 {
-            return Vec::new();
-        }
-        let n = self.derived().formula.dimension();
-        let Formula { graph, root, constraints, .. } = &self.derived().formula;
-        let moves = |set: &[usize]| constraints.iter().all(|c| graph.moves_into_itself(*c, set));
-        let turned = |planes: &[(usize, usize)]| constraints.iter().all(|c| graph.turns_into_itself(*c, planes));
-        let mut work = Work::new(graph, &self.derived().applied_nodes);
-        let bodies = graph.sets_of_differences(*root, n);
-        let mut seen = Vec::new();
-        let cyclic = (0..n).filter(|i| self.derived().cyclic.get(*i) == Some(&true));
-        seen.extend(cyclic.filter(|i| moves(&[*i]) && work.vanishes_along(&[*i])).map(|i| along(&[i])));
-        let moving = bodies.iter().filter(|set| graph.moves_into_itself(*root, set));
-        seen.extend(moving.filter(|set| moves(set) && work.vanishes_along(set)).map(|set| along(set)));
-        let turns = |(i, j): &(usize, usize)| graph.turns_into_itself(*root, &[(*i, *j)]) && turned(&[(*i, *j)]);
-        let pairs = (0..n).flat_map(|j| (0..j).map(move |i| (i, j))).filter(turns);
-        seen.extend(pairs.filter(|pair| work.vanishes_around(&[*pair])).map(|(i, j)| Symmetry::Rotation(i, j)));
-        for (k, second) in bodies.iter().enumerate() {
-            for first in bodies.iter().take(k).filter(|first| first.len() == second.len()) {
-                let planes: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
-                if graph.turns_into_itself(*root, &planes) && turned(&planes) && work.vanishes_around(&planes) {
-                    seen.extend(Symmetry::rotations(&planes));
-                }
-            }
-        }
-        seen
+        let along = |set: &[usize]| SVector::from_fn(|j, _| if set.contains(&j) { 1.0 } else { 0.0 });
+        let of = |found: &FormulaSymmetry| match found {
+            FormulaSymmetry::Translation(set) => Some(Symmetry::Translation(along(set))),
+            FormulaSymmetry::Rotation(planes) => match planes[..] {
+                [(i, j)] => Some(Symmetry::Rotation(i, j)),
+                _ => Symmetry::rotations(planes).ok(),
+            },
+        };
+        self.derivatives.symmetries().iter().filter_map(of).collect()
     }
 }
 

@@ -49,7 +49,6 @@ mod peer;
 mod request;
 mod sensitivity;
 mod sparse;
-mod symmetry;
 mod system;
 
 pub use body::{Body, BodyDerivatives, BodyEnsemble, BodyEvent, BodyMember, BodyMotion, BodyOutcome, BodyTorque};
@@ -74,7 +73,6 @@ pub use peer::{FirstOrder, Peer, PeerEnd};
 pub use request::{Direction, Event, InitialVelocity, Motion, OutputTimes, Start, StepControl};
 pub use sensitivity::{EventAt, Loss, LossGradient, Sensitivity};
 pub use sparse::{Bodies, Boundary, Lattice, SiteMotion, SiteSystem, SumOfTerms};
-pub use symmetry::FormulaSymmetry;
 pub use system::System;
 
 pub use contact_geom::nalgebra::DMatrix;
@@ -87,6 +85,6 @@ pub use discrete_herglotz::{
     Steps, UnknownIntegrator, UnresolvedStep, boundary::PathStatus, ensemble::Tally, hamiltonian::ModifiedDefect,
 };
 pub use formula_lagrangian::{Direction as FormulaDirection, Friction, Reset as FormulaReset};
-pub use formula_lagrangian::{Expression, Formula, FormulaError, FormulaNames, Graph, ParseError};
+pub use formula_lagrangian::{Expression, Formula, FormulaError, FormulaNames, FormulaSymmetry, Graph, ParseError};
 pub use formula_lagrangian::{Symbol, Symbols, nearest_name};
 pub use herglotz_fit::{Bound, Fit, FitError, FitStatus, Loss as ResidualLoss};

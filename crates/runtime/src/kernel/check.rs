@@ -1,12 +1,13 @@
 //! The steps of a motion as maps: contact defects, Herglotz defects and residuals of the theorems.
 
 use super::Kernel;
+use super::WITHOUT_CONSTRAINTS;
 use super::discrete::{custom, has_custom, no_custom};
 use super::formula_system::FormulaSystem;
 use super::many::{ManyCoordinates, few, gauss};
 use super::sized::{Sized, coordinates};
 use super::theorems::{Points, theorems};
-use crate::full::FULL;
+use crate::full::{FULL, not_compiled};
 use crate::{
     Check, FormulaMethod, Interrupt, MomentumSample, Motion, NotContact, Plan, RuntimeError, Sample, StatementResidual,
     StepControl,
@@ -92,6 +93,7 @@ fn run_by<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     };
     Ok(match (problem.lagrangian().constrained(by)?, by) {
         (Some(method), _) => problem.by(method).steps(Steps::Count(count)),
+        (None, _) if const { !L::IS_FREE } => return Err(not_compiled(WITHOUT_CONSTRAINTS)),
         (None, Some(by)) => problem.by(L::by(by)?).steps(Steps::Count(count)),
         (None, None) => problem.steps(Steps::Count(count)),
     })
@@ -265,7 +267,9 @@ pub(super) fn of_many(system: &ManyCoordinates, motion: &Motion, samples: usize)
         stepper.advance(count).map_err(|failure| failure.cause)?;
         Ok(([problem.state().clone(), stepper.state()], stepper.sigma()))
     };
-    let samples = samples_at(&record.states, &maps, (false, (&by, plan.step_size, 1)), &|_| Vec::new(), motion)?;
+    let symmetries = Kernel::symmetries(system);
+    let momenta = |x: &State| symmetries.iter().map(|symmetry| symmetry.momentum(&x.q, &x.p)).collect();
+    let samples = samples_at(&record.states, &maps, (false, (&by, plan.step_size, 1)), &momenta, motion)?;
     Ok(checked(formula, Kernel::has_force(system), &plan, samples))
 }
 

@@ -1,5 +1,6 @@
 //! Integrators for formulas with holonomic constraints.
 
+use crate::full::FULL;
 use crate::{Motion, RuntimeError};
 use contact_geom::constraints::{Constraint, ConstraintDerivatives, Redundancy, constrained_motion};
 use contact_geom::nalgebra::{DMatrix, SVector};
@@ -15,10 +16,10 @@ use formula_lagrangian::{Formula, FormulaLagrangian};
 /// The largest number of coordinates with constraints.
 pub(super) const MAX_CONSTRAINED_COORDINATES: usize = 8;
 
-/// Whether motions under constraints are compiled for this number of coordinates. A formula with constraints has a
-/// kernel of the next of these sizes.
+/// Whether motions under constraints are compiled for this number of coordinates, without the feature `full` for one alone. A formula with
+/// constraints has a kernel of the next of these sizes.
 pub(super) const fn is_compiled(coordinates: usize) -> bool {
-    matches!(coordinates, 2 | 4 | MAX_CONSTRAINED_COORDINATES)
+    coordinates == MAX_CONSTRAINED_COORDINATES || FULL && matches!(coordinates, 2 | 4)
 }
 
 /// The number of stages of contact Lobatto methods where none is named: order 8.

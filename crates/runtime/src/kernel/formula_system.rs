@@ -43,6 +43,9 @@ pub(super) trait Observed {
 pub(super) trait FormulaSystem<const N: usize>:
     Lagrangian<N> + Observed + Clone + Send + Sync + 'static
 {
+    /// Whether motions without constraints are compiled.
+    const IS_FREE: bool = true;
+
     /// The integrators for it, which are compiled.
     type By: for<'a> Integrator<'a, Self, N> + Copy + Sync;
     /// The integrators for it where it has constraints.
@@ -116,6 +119,8 @@ impl<const N: usize> Observed for FormulaLagrangian<N> {
 }
 
 impl<const N: usize> FormulaSystem<N> for FormulaLagrangian<N> {
+    const IS_FREE: bool = super::has_kernel(N);
+
     type By = AnyIntegrator;
     type Constrained = OfConstraints;
 

@@ -5,10 +5,11 @@ use super::recorder::Recorder;
 use super::run::{outcome_of, plan_of, requested};
 use super::sensitivity::{exponents_of, loss_gradient, unobserved};
 use super::sized::{check_direction, checked, initial_state};
-use super::{Differentiated, Kernel, check, ensemble};
+use super::{DERIVATIVES, Differentiated, ENSEMBLES, Kernel, check, ensemble, geometry};
+use crate::full::{FULL, not_compiled};
 use crate::{
-    Check, Ensemble, EnsembleMonitor, FormulaSymmetry, Loss, LossGradient, LyapunovExponents, Motion, Outcome, Plan,
-    RunMonitor, RuntimeError, Sensitivity, StepControl,
+    Check, Ensemble, EnsembleMonitor, Loss, LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor,
+    RuntimeError, Sensitivity, Start, StepControl,
 };
 use contact_geom::nalgebra::DMatrix;
 use contact_geom::switching::BreakRate;
@@ -184,9 +185,13 @@ impl ManyCoordinates {
 
     pub(super) fn problem(&self, motion: &Motion) -> Result<SystemProblem<'_>, RuntimeError> {
         check_direction(self.0.formula(), motion.start.t, motion.end)?;
-        let start = initial_state(self.0.formula(), &motion.start)?;
-        let problem = SystemProblem::new(self, motion.start.t, start)?;
-        let force = self.applied_force(motion.start.t, problem.start());
+        self.problem_at(&motion.start)
+    }
+
+    /// The problem of a start, validated.
+    fn problem_at(&self, at: &Start) -> Result<SystemProblem<'_>, RuntimeError> {
+        let problem = SystemProblem::new(self, at.t, initial_state(self.0.formula(), at)?)?;
+        let force = self.applied_force(at.t, problem.start());
         let names = self.0.formula().coordinates();
         match names.into_iter().zip(force.iter().copied()).find(|(_, value)| !value.is_finite()) {
             Some((coordinate, value)) => Err(RuntimeError::ForceUndefined { coordinate, value }),
@@ -232,8 +237,12 @@ pub(super) fn gauss(by: AnyIntegrator) -> Result<GaussCollocation, InputError> {
     match by {
         AnyIntegrator::Gauss { stages } => Ok(GaussCollocation { stages }),
         _ => Err(InputError::Hypothesis {
-            hypothesis: "at most 16 coordinates; a formula with more runs by `gauss_1` to `gauss_16`, and a lattice of \
-                         equal sites by splittings too",
+            hypothesis: if FULL {
+                "at most 16 coordinates; a formula with more runs by `gauss_1` to `gauss_16`, and a lattice of equal sites \
+                 by splittings too"
+            } else {
+                "at most 4 coordinates; a formula with more runs here by `gauss_1` to `gauss_16`"
+            },
         }),
     }
 }
@@ -259,8 +268,8 @@ impl Kernel for ManyCoordinates {
         self.0.has_force()
     }
 
-    fn symmetries(&self) -> Vec<FormulaSymmetry> {
-        Vec::new()
+    fn derivatives(&self) -> Option<&FormulaDerivatives> {
+        Some(&self.0)
     }
 
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {
@@ -269,6 +278,14 @@ impl Kernel for ManyCoordinates {
 
     fn check_integrator(&self, integrator: AnyIntegrator) -> Result<(), InputError> {
         gauss(integrator).map(|_| ())
+    }
+
+    fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
+        geometry::rates_of_many(&self.0, t, y, to);
+    }
+
+    fn point(&self, at: &Start) -> Result<Point, RuntimeError> {
+        Ok(self.problem_at(at)?.start().clone())
     }
 
     fn plan(&self, motion: &Motion) -> Result<Plan, RuntimeError> {
@@ -290,6 +307,9 @@ impl Kernel for ManyCoordinates {
         of: Differentiated<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<Sensitivity, RuntimeError> {
+        if const { !FULL } {
+            return Err(not_compiled(DERIVATIVES));
+        }
         let (until, problem) = (Until::Time(motion.end), self.problem(motion)?);
         let times = of.row_times(motion);
         self.observed(&unobserved(motion), (monitor, times.last().copied()), |run| {
@@ -305,6 +325,9 @@ impl Kernel for ManyCoordinates {
         loss: &mut Loss<'_>,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LossGradient, RuntimeError> {
+        if const { !FULL } {
+            return Err(not_compiled(DERIVATIVES));
+        }
         let until = Until::Time(motion.end);
         self.observed(&unobserved(motion), (monitor, None), |run| {
             Ok(loss_gradient(run.gradient_at(times, |states| loss(states), until)?, self.dimension()))
@@ -316,6 +339,9 @@ impl Kernel for ManyCoordinates {
         motion: &Motion,
         monitor: &mut dyn RunMonitor,
     ) -> Result<LyapunovExponents, RuntimeError> {
+        if const { !FULL } {
+            return Err(not_compiled(DERIVATIVES));
+        }
         let until = Until::Time(motion.end);
         self.observed(&unobserved(motion), (monitor, None), |run| {
             let is_of_contact = !self.0.has_force() && !self.0.formula().has_noncontact_resets();
@@ -324,7 +350,7 @@ impl Kernel for ManyCoordinates {
     }
 
     fn ensemble(&self, ensemble: &Ensemble<'_>, monitor: &mut dyn EnsembleMonitor) -> Result<Tally, RuntimeError> {
-        ensemble::run(self, ensemble, monitor)
+        if const { FULL } { ensemble::run(self, ensemble, monitor) } else { Err(not_compiled(ENSEMBLES)) }
     }
 
     /// Without the theorems on discrete Lagrangians.

@@ -28,15 +28,17 @@ use crate::{
     LossGradient, LyapunovExponents, Motion, Outcome, Plan, RunMonitor, RuntimeError, Sensitivity, Start,
 };
 pub(crate) use constrained::refuse_constraints;
-use contact_geom::{HamiltonianStructure, Lagrangian, Structure, Symmetry};
+use contact_geom::{HamiltonianStructure, Lagrangian, Structure};
 use discrete_herglotz::hamiltonian::ModifiedDefect;
-use discrete_herglotz::{AnyIntegrator, InputError, Integrator, ResumeState, ensemble::Tally, sensitivity::Variable};
+use discrete_herglotz::{
+    AnyIntegrator, InputError, Integrator, Point, ResumeState, ensemble::Tally, sensitivity::Variable,
+};
 pub(crate) use event_times::{Differentiated, of_expression};
-use formula_lagrangian::{Formula, FormulaError, FormulaLagrangian};
+use formula_lagrangian::{Formula, FormulaDerivatives, FormulaError, FormulaLagrangian};
 use formula_system::FormulaSystem;
 pub(crate) use run::LOSSES_WITH_FORCE;
-use sized::Sized;
 pub(crate) use sized::check_direction;
+use sized::{Sized, coordinates};
 use std::sync::Arc;
 use work_thread::on_large_stack;
 
@@ -50,7 +52,13 @@ pub(crate) trait Kernel: Send + Sync {
     fn structure(&self) -> Structure;
     fn is_smooth(&self) -> bool;
     fn has_force(&self) -> bool;
-    fn symmetries(&self) -> Vec<FormulaSymmetry>;
+    /// The derivatives of a Lagrangian formula, over the number of coordinates of the kernel; `None` of a Hamiltonian.
+    fn derivatives(&self) -> Option<&FormulaDerivatives> {
+        None
+    }
+    fn symmetries(&self) -> Vec<FormulaSymmetry> {
+        self.derivatives().map_or_else(Vec::new, FormulaDerivatives::symmetries)
+    }
     /// The proved structure of a Hamiltonian; `None` for a Lagrangian.
     fn hamiltonian_structure(&self) -> Option<HamiltonianStructure> {
         None
@@ -68,8 +76,15 @@ pub(crate) trait Kernel: Send + Sync {
     fn rates(&self, _t: f64, _y: &[f64], to: &mut [f64]) {
         to.fill(f64::NAN);
     }
-    fn geometry(&self, _at: &Start) -> Result<Geometry, RuntimeError> {
+    /// The start of a motion, validated, with its velocity.
+    fn point(&self, _at: &Start) -> Result<Point, RuntimeError> {
         Err(self.lacks("geometry on TQ x R"))
+    }
+    fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {
+        refuse_constraints(self.formula(), "the geometry on TQ x R and the Herglotz field")?;
+        let x = self.point(at)?;
+        let derivatives = self.derivatives().ok_or_else(|| self.lacks("geometry on TQ x R"))?;
+        geometry::at(derivatives, at.t, &x)
     }
     fn hamiltonian_geometry(&self, _at: &Start) -> Result<HamiltonianGeometry, RuntimeError> {
         Err(FormulaError::IsLagrangian.into())
@@ -125,13 +140,16 @@ const DERIVATIVES: &str = "derivatives of motions";
 
 const ENSEMBLES: &str = "ensembles";
 
-/// Whether there is a kernel of this number of coordinates: without the feature `full` only of a few.
+/// What a kernel of formulas with constraints alone does not compute.
+const WITHOUT_CONSTRAINTS: &str = "motions without constraints in this number of coordinates";
+
+/// Whether there is a kernel of this number of coordinates for formulas without constraints: without the feature `full` only of a few.
 const fn has_kernel(coordinates: usize) -> bool {
-    FULL || matches!(coordinates, 1 | 2 | 4 | constrained::MAX_CONSTRAINED_COORDINATES)
+    FULL || matches!(coordinates, 1 | 2 | 4)
 }
 
-/// The largest number of coordinates for which kernels are compiled.
-const MOST_COMPILED_COORDINATES: usize = 16;
+/// The largest number of coordinates for which kernels without constraints are compiled.
+const MOST_COMPILED_COORDINATES: usize = if FULL { 16 } else { 4 };
 
 /// The kernel of a formula.
 pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeError> {
@@ -146,11 +164,13 @@ pub(crate) fn kernel_of(formula: &Formula) -> Result<Arc<dyn Kernel>, RuntimeErr
     macro_rules! of {
         ($($n:literal)*) => {
             match formula.dimension() {
-                $(found if const { has_kernel($n) } && found <= $n && (!constrained || constrained::is_compiled($n)) => {
+                $(found if const { has_kernel($n) || constrained::is_compiled($n) }
+                    && found <= $n
+                    && if constrained { constrained::is_compiled($n) } else { has_kernel($n) } =>
+                {
                     Ok(Arc::new(Sized(formula.lagrangian_within::<$n>()?)) as Arc<dyn Kernel>)
                 })*
-                _ if const { FULL } => many::kernel_of(formula),
-                _ => Err(not_compiled("formulas with more coordinates")),
+                _ => many::kernel_of(formula),
             }
         };
     }
@@ -175,16 +195,8 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         Lagrangian::has_force(&self.0)
     }
 
-    fn symmetries(&self) -> Vec<FormulaSymmetry> {
-        let recognised = |symmetry: &Symmetry<N>| match symmetry {
-            Symmetry::Translation(a) => Some(FormulaSymmetry::Translation((0..N).filter(|i| a[*i] != 0.0).collect())),
-            Symmetry::Rotation(i, j) => Some(FormulaSymmetry::Rotation(vec![(*i, *j)])),
-            Symmetry::Rotations(planes) => Some(FormulaSymmetry::Rotation(
-                planes.iter().enumerate().filter_map(|(i, j)| j.map(|j| (i, j))).collect(),
-            )),
-            _ => None,
-        };
-        self.0.symmetries().iter().filter_map(recognised).collect()
+    fn derivatives(&self) -> Option<&FormulaDerivatives> {
+        Some(self.0.derivatives())
     }
 
     fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Arc<dyn Kernel>, FormulaError> {
@@ -221,9 +233,10 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         geometry::rates(self, t, y, to);
     }
 
-    fn geometry(&self, at: &Start) -> Result<Geometry, RuntimeError> {
-        refuse_constraints(self.formula(), "the geometry on TQ x R and the Herglotz field")?;
-        geometry::at(self, at)
+    fn point(&self, at: &Start) -> Result<Point, RuntimeError> {
+        let (problem, n) = (self.problem(at)?, self.0.formula().dimension());
+        let x = problem.start();
+        Ok(Point { q: coordinates(x.q.as_slice(), n).into(), v: coordinates(x.v.as_slice(), n).into(), z: x.z })
     }
 
     fn check(&self, motion: &Motion, samples: usize) -> Result<Check, RuntimeError> {
@@ -231,6 +244,9 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
     }
 
     fn modified_defects(&self, motion: &Motion, most: usize) -> Result<Vec<ModifiedDefect>, RuntimeError> {
+        if const { !FULL } {
+            return Err(not_compiled("modified Hamiltonians"));
+        }
         refuse_constraints(self.formula(), "modified Hamiltonians")?;
         check::modified_defects(self, motion, most)
     }

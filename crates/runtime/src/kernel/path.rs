@@ -1,5 +1,6 @@
 //! Paths between given ends.
 
+use crate::full::{FULL, not_compiled};
 use crate::{BoundaryProblem, FoundPath, RuntimeError};
 use contact_geom::nalgebra::SVector;
 use contact_geom::{DiscretePoint, Lagrangian, PhasePoint, VelocityPoint, legendre};
@@ -18,7 +19,8 @@ pub(crate) fn search(formula: &Formula, problem: &BoundaryProblem) -> Result<Fou
         1 => within::<1>(formula, problem),
         2 => within::<2>(formula, problem),
         3..=4 => within::<4>(formula, problem),
-        5..=8 => within::<8>(formula, problem),
+        5..=8 if const { FULL } => within::<8>(formula, problem),
+        5..=8 => Err(not_compiled("paths with more coordinates")),
         n => Err(RuntimeError::argument(
             "coordinates",
             format!("are {n}, but paths between two ends are compiled for 1 to 8; write the system in Rust"),

@@ -1,9 +1,11 @@
 //! Runs of one motion.
 
+use super::WITHOUT_CONSTRAINTS;
 use super::discrete;
 use super::formula_system::FormulaSystem;
 use super::recorder::Recorder;
 use super::sized::{Sized, coordinates};
+use crate::full::not_compiled;
 use crate::{Motion, Outcome, Plan, PlanEntry, RunMonitor, RuntimeError, StepControl};
 use contact_geom::nalgebra::SVector;
 use discrete_herglotz::{Problem, ResumeState, Run, Steps, Until, Vector};
@@ -48,6 +50,7 @@ pub(super) fn of<'p, 'o, L: FormulaSystem<N>, const N: usize>(
     let run = match (motion.step_control, system.0.constrained(by)?) {
         (StepControl::Accuracy { error, .. }, Some(method)) => problem.by(method).accuracy(error),
         (StepControl::Steps { steps, .. }, Some(method)) => problem.by(method).steps(steps),
+        (_, None) if const { !L::IS_FREE } => return Err(not_compiled(WITHOUT_CONSTRAINTS)),
         (StepControl::Accuracy { error, by: None }, None) => problem.accuracy(error),
         (StepControl::Accuracy { error, by: Some(by) }, None) => problem.by(L::by(by)?).accuracy(error),
         (StepControl::Steps { by, steps }, None) => problem.by(L::by(by)?).steps(steps),
