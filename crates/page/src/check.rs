@@ -2,10 +2,12 @@
 
 use crate::numbers::number;
 use crate::request::{Deadline, answer, of_motion};
-use herglotz::runtime::{Motion, StepControl, Steps};
+use crate::run::planned;
+use herglotz::Scene;
+use herglotz::runtime::{InitialVelocity, Motion, RuntimeError, Start, Status, StepControl, Steps};
 use serde_json::{Value, json};
 
-/// The defect of the contact form of the first step of a motion: the step is a contact transformation where it is of the size of
+/// The defect of the contact form of the last step of a motion: the step is a contact transformation where it is of the size of
 /// round-off.
 pub fn check(request: &str) -> Value {
     answer(request, |request| {
@@ -18,6 +20,7 @@ pub fn check(request: &str) -> Value {
             }
             None => motion,
         };
+        let motion = of_last_step(&scene, motion).map_err(of_motion(&scene))?;
         let check = scene.system.check(&motion, 1).map_err(of_motion(&scene))?;
         let last = check.samples.last();
         Ok(json!({
@@ -29,4 +32,20 @@ pub fn check(request: &str) -> Value {
             "is_contact": check.not_contact.is_none(),
         }))
     })
+}
+
+/// The last step of a motion, as a motion; the whole motion where the steps before it do not reach it.
+fn of_last_step(scene: &Scene, motion: Motion) -> Result<Motion, RuntimeError> {
+    let plan = scene.system.plan(&motion)?;
+    let Some(StepControl::Steps { by, .. }) = planned(&plan) else { return Ok(motion) };
+    let steps = |count| StepControl::Steps { by, steps: Steps::Count(count) };
+    let motion = Motion { step_control: steps(plan.steps), ..motion };
+    if plan.steps < 2 {
+        return Ok(motion);
+    }
+    let before = Motion { end: motion.end - plan.step_size, step_control: steps(plan.steps - 1), ..motion.clone() };
+    let outcome = scene.system.run(&before, &mut ())?;
+    let (Status::Completed, Some(v), Some(z)) = (outcome.status, outcome.v, outcome.z) else { return Ok(motion) };
+    let velocity = InitialVelocity::MomentumNear { p: outcome.p, v };
+    Ok(Motion { start: Start { t: outcome.t, q: outcome.q, velocity, z }, step_control: steps(1), ..motion })
 }

@@ -183,7 +183,7 @@ const runCheck = async (request) => {
   const found = await engine.call("check", { ...request, ...stepsOf(answer) });
   if (found.error || found.stopped || found.fault || found.contact_defect === null) return;
   const lines = [
-    `a step at t = ${found.t}: sigma_d = ${found.sigma}`,
+    `the last step, from t = ${found.t}: sigma_d = ${found.sigma}`,
     `the defect of the contact form is ${Number(found.contact_defect).toExponential(1)}: ` +
       (found.is_contact ? "the step is a contact transformation to round-off" : "a force or a reset does not keep the form"),
   ];
