@@ -54,6 +54,11 @@ impl Kernels {
         let derivatives: Box<dyn Slices> = Box::new(system);
         Kernels { collocation, derivatives: Rc::new(derivatives) }
     }
+
+    /// The kernels for motions alone: derivatives of them are computed one stage after another. For small programs.
+    pub fn of_motions<F: ScalarSystem + 'static>(system: Arc<F>) -> Self {
+        Kernels { collocation: Rc::new(KernelsOf.visit(system)), derivatives: Rc::new(()) }
+    }
 }
 
 /// The stages of a system: by its kernels, or one after another.

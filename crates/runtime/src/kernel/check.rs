@@ -31,6 +31,10 @@ const RELATIVE_DISTANCE: f64 = 1e-3;
 /// expensive.
 const THEOREM_SAMPLES: usize = 3;
 
+/// The number of coordinates up to which theorems are evaluated with the stages of the motion, and the number of stages in more.
+const FEW_COORDINATES: usize = 4;
+const STAGES_IN_MANY_COORDINATES: usize = 4;
+
 /// The number of steps between two polls of the interrupt: a poll is then inexpensive compared with the steps.
 const STEPS_BETWEEN_POLLS: usize = 256;
 
@@ -347,6 +351,8 @@ pub(super) fn check<const N: usize>(
     }
     let of_theorems: Vec<_> = states.iter().step_by(states.len().div_ceil(THEOREM_SAMPLES)).collect();
     let stages = collocation.unwrap_or(DEFAULT_STAGES);
+    // The theorems hold for any number of stages, and the time grows with the cube of their unknowns.
+    let stages = if formula.dimension() > FEW_COORDINATES { stages.min(STAGES_IN_MANY_COORDINATES) } else { stages };
     check.statements = if Lagrangian::has_force(lagrangian) {
         // The theorems are about discrete Lagrangians, which do not exist with a force.
         virtual_work(stages, check.step_size, &of_theorems, &|stages, h, t, x| {

@@ -118,7 +118,7 @@ impl System for ManyCoordinates {
         to
     }
     fn kernels(&self) -> Option<Kernels> {
-        Some(Kernels::of(self.0.clone()))
+        Some(if const { FULL } { Kernels::of(self.0.clone()) } else { Kernels::of_motions(self.0.clone()) })
     }
     fn value(&self, t: f64, x: &Point) -> f64 {
         self.0.value::<f64, 0>(t, &x.q, &x.v, x.z)

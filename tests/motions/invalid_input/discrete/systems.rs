@@ -16,7 +16,7 @@ pub const TESTS: &[InputTest] = &[
     InputTest { entries: &["SystemProblem::new"], run: starts },
     InputTest { entries: &["SystemProblem::by", "SystemProblem::steps", "SystemProblem::accuracy"], run: runs },
     InputTest { entries: &["System::value", "System::gradient", "System::hessian"], run: faults },
-    InputTest { entries: &["Kernels::of"], run: kernels },
+    InputTest { entries: &["Kernels::of", "Kernels::of_motions"], run: kernels },
     InputTest { entries: &["Ensemble::of_systems"], run: ensembles },
     InputTest { entries: &["State::check", "$name::new", "$name::fixed", "$name::is_finite"], run: states },
     InputTest { entries: &["Vector::dot", "Vector::component_div", "Vector::fixed"], run: vectors },
@@ -80,8 +80,11 @@ impl System for Pendulum {
     }
 }
 
+/// How kernels are made.
+type Made = fn(Arc<FaultyKernels>) -> Kernels;
+
 /// The same pendulum without a fault, with kernels that have one from the start.
-struct WithKernels(Fault);
+struct WithKernels(Fault, Made);
 
 impl System for WithKernels {
     fn dimension(&self) -> usize {
@@ -97,7 +100,7 @@ impl System for WithKernels {
         Pendulum(Fault::None, 0.0).hessian(t, x)
     }
     fn kernels(&self) -> Option<Kernels> {
-        Some(Kernels::of(Arc::new(FaultyKernels(self.0))))
+        Some((self.1)(Arc::new(FaultyKernels(self.0))))
     }
 }
 
@@ -251,8 +254,9 @@ fn faults(report: &mut Report) {
 fn kernels(report: &mut Report) {
     let start = Point::new([0.3], [0.7], 0.2);
     let (by, steps, until) = (GaussCollocation { stages: 3 }, Steps::Size(0.1), Until::Steps(5));
-    for fault in [Fault::Nan, Fault::Panics] {
-        let system = WithKernels(fault);
+    let made: [Made; 2] = [Kernels::of, Kernels::of_motions];
+    for (fault, made) in [Fault::Nan, Fault::Panics].into_iter().flat_map(|fault| made.map(|made| (fault, made))) {
+        let system = WithKernels(fault, made);
         let problem = SystemProblem::new(&system, 0.0, start.clone()).unwrap();
         let outcome = problem.by(by).steps(steps).run(until).unwrap();
         let kept = matches!(outcome.status, Status::Failed { step: 0, .. }) && finite(&outcome);
@@ -261,16 +265,18 @@ fn kernels(report: &mut Report) {
         let failed = tangent.as_ref().map_or(true, |tangent| tangent.outcome.status != Status::Completed);
         report.check(failed, || format!("derivatives of kernels, {fault:?}: {tangent:?}"));
     }
-    let (sound, plain) = (WithKernels(Fault::None), Pendulum(Fault::None, 0.0));
+    let plain = Pendulum(Fault::None, 0.0);
     let variables = [Variable::Position(0), Variable::Velocity(0), Variable::Action, Variable::StartTime];
     let of = |system: &dyn System| {
         let problem = SystemProblem::new(system, 0.0, start.clone()).unwrap();
         problem.by(by).steps(steps).tangent(&variables, until).unwrap()
     };
-    let (one, other) = (of(&sound), of(&plain));
-    let near = |a: f64, b: f64| (a - b).abs() <= 1e-13;
-    let same = one.columns.iter().zip(&other.columns).all(|(a, b)| near(a.q[0], b.q[0]) && near(a.z, b.z));
-    report.check(same && near(one.outcome.q[0], other.outcome.q[0]), || format!("{one:?} and {other:?}"));
+    for made in made {
+        let (one, other) = (of(&WithKernels(Fault::None, made)), of(&plain));
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-13;
+        let same = one.columns.iter().zip(&other.columns).all(|(a, b)| near(a.q[0], b.q[0]) && near(a.z, b.z));
+        report.check(same && near(one.outcome.q[0], other.outcome.q[0]), || format!("{one:?} and {other:?}"));
+    }
 }
 
 /// A member whose system or start is faulty is refused, or ends with a status; the others are its single runs.
