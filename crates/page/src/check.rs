@@ -20,11 +20,14 @@ pub fn check(request: &str) -> Value {
             }
             None => motion,
         };
+        let start = motion.start.t;
         let motion = of_last_step(&scene, motion).map_err(of_motion(&scene))?;
+        let is_last = motion.start.t != start;
         let check = scene.system.check(&motion, 1).map_err(of_motion(&scene))?;
         let last = check.samples.last();
         Ok(json!({
             "integrator": check.integrator,
+            "is_last": is_last,
             "t": last.map(|sample| number(sample.t)),
             "sigma": last.map(|sample| number(sample.sigma)),
             "contact_defect": last.map(|sample| number(sample.contact_defect)),
@@ -34,13 +37,16 @@ pub fn check(request: &str) -> Value {
     })
 }
 
-/// The last step of a motion, as a motion; the whole motion where the steps before it do not reach it.
+/// The number of steps from which on the last one is not computed again, but the first one is checked: it would take seconds.
+const MOST_STEPS: usize = 20_000;
+
+/// The last step of a motion, as a motion; the whole motion where the steps before it do not reach it, or are too many.
 fn of_last_step(scene: &Scene, motion: Motion) -> Result<Motion, RuntimeError> {
     let plan = scene.system.plan(&motion)?;
     let Some(StepControl::Steps { by, .. }) = planned(&plan) else { return Ok(motion) };
     let steps = |count| StepControl::Steps { by, steps: Steps::Count(count) };
     let motion = Motion { step_control: steps(plan.steps), ..motion };
-    if plan.steps < 2 {
+    if !(2..MOST_STEPS).contains(&plan.steps) {
         return Ok(motion);
     }
     let before = Motion { end: motion.end - plan.step_size, step_control: steps(plan.steps - 1), ..motion.clone() };

@@ -125,7 +125,7 @@ const runOnce = async () => {
   milliseconds = performance.now() - began;
   show();
   if (!isDragging && element("cloud").checked && scene.kind === "motion") await runCloud(request, found.evaluations);
-  if (!isDragging && scene.kind === "motion" && !isWanted) await runCheck(request);
+  if (!isDragging && !answer.is_over && scene.kind === "motion" && !isWanted) await runCheck(request);
 };
 
 /// The steps of a run, by which it can be repeated.
@@ -182,8 +182,9 @@ const radius = (name) => {
 const runCheck = async (request) => {
   const found = await engine.call("check", { ...request, ...stepsOf(answer) });
   if (found.error || found.stopped || found.fault || found.contact_defect === null) return;
+  const which = found.is_last ? "the last step" : "the first step";
   const lines = [
-    `the last step, from t = ${found.t}: sigma_d = ${found.sigma}`,
+    `${which}, from t = ${found.t}: sigma_d = ${found.sigma}`,
     `the defect of the contact form is ${Number(found.contact_defect).toExponential(1)}: ` +
       (found.is_contact ? "the step is a contact transformation to round-off" : "a force or a reset does not keep the form"),
   ];
