@@ -136,7 +136,7 @@ impl<const N: usize> FormulaLagrangian<N> {
     }
 
     /// The derivatives that it evaluates, over N coordinates.
-    pub fn derivatives(&self) -> &FormulaDerivatives {
+    pub fn derivatives(&self) -> &Arc<FormulaDerivatives> {
         &self.derivatives
     }
 

@@ -112,6 +112,55 @@ test("a Lagrangian that is typed runs", async () => {
   });
 });
 
+// Kernels that no example has: the engine of the page has few of them.
+test("more coordinates than a kernel has, and constraints on few", async () => {
+  await withPage(async (page) => {
+    const masses = Array.from({ length: 6 }, (_, k) => `x${k + 1}`);
+    const springs = masses.slice(1).map((name, k) => `(${name} - ${masses[k]})^4`);
+    const chain = `version = 2
+[system]
+coordinates = [${masses.map((name) => `"${name}"`).join(", ")}]
+lagrangian = "(${masses.map((name) => `${name}'^2`).join(" + ")})/2 - ${springs.join(" - ")} - z/10"
+[start]
+${masses.map((name, k) => `${name} = ${k}.0\n"${name}'" = ${k % 2}.0`).join("\n")}
+[run]
+time = 5.0
+accuracy = 1e-8
+[want]
+rows = { every = 0.1, columns = ["t"] }
+`;
+    await type(page, chain);
+    assert.match(await statusOf(page), /^completed/);
+    assert.match(await page.textContent("#properties"), /p_x1 \+ p_x2/);
+    assert.match(await page.textContent("#plan"), /the last step, [^]*the defect of the contact form is \d\.\de-1\d/);
+    await type(page, chain.replace("accuracy = 1e-8", 'integrator = "strang"\nstep = 0.1'));
+    assert.match(await page.textContent("#error"), /at most 4 coordinates/);
+    await type(
+      page,
+      `version = 2
+[system]
+coordinates = ["x", "y"]
+lagrangian = "(x'^2 + y'^2)/2 - g*y + gamma*z"
+constraints = ["x^2 + y^2 = 1"]
+parameters = { g = 9.81, gamma = -0.1 }
+[start]
+x = 1.0
+y = 0.0
+"x'" = 0.0
+"y'" = 0.0
+[run]
+time = 5.0
+accuracy = 1e-8
+[want]
+rows = { every = 0.1, columns = ["t", "x", "y"] }
+`,
+    );
+    assert.match(await statusOf(page), /^completed/);
+    const rows = numbersOf(await saved(page, "#csv"));
+    assert.ok(rows.length === 51 && rows.every(([, x, y]) => Math.abs(x * x + y * y - 1) < 1e-12));
+  });
+});
+
 test("an error is shown at its place, and the page goes on", async () => {
   await withPage(async (page) => {
     await type(page, withError);

@@ -112,6 +112,22 @@ fn kinks_are_met_or_refused() {
     assert!(met > 0);
 }
 
+/// An accuracy that no number has is refused with the round-off of the motion, as one next to it: its first steps are no shorter.
+#[test]
+fn accuracies_below_round_off_are_refused_with_it() {
+    let line = One::from(Line { gamma: -0.1, swing: 0.0, potential: Potential::Well });
+    for wanted in [1e-17, 1e-30, 1e-300, f64::from_bits(1)] {
+        let refused = run_to(&line, at(0.3, -0.5), 40.0, wanted).err();
+        assert!(
+            matches!(
+                refused,
+                Some(InputError::Accuracy { cause: SelectionFailure::RoundOff, reached, .. }) if reached < 1e-13
+            ),
+            "{wanted:e}: {refused:?}"
+        );
+    }
+}
+
 /// A motion that has come to rest, up to round-off, is continued to the end of the span.
 #[test]
 fn motions_that_come_to_rest_are_followed() {

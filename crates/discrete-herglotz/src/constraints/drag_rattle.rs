@@ -1,6 +1,6 @@
 //! RATTLE with a linear drag, and its compositions.
 
-use super::factored::Factored;
+use super::linear_system::SmallSystem;
 use super::start::inverse_mass;
 use super::variation::{Unvaried, Vary};
 use super::{ConstrainedStart, Corrections, Progress};
@@ -64,6 +64,13 @@ pub struct RattleStep<const N: usize, const M: usize, T = f64> {
     pub end: PhasePoint<N, T>,
     /// The sum of the impulses `Y + Y'` of all substeps. It vanishes on dependent constraints that were left out.
     pub impulse: SVector<T, M>,
+}
+
+/// `-V`, `-V_q` and `G = c_q` at a position.
+struct Place<const N: usize, const M: usize, T> {
+    value: T,
+    force: SVector<T, N>,
+    jacobian: SMatrix<T, M, N>,
 }
 
 impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> DragRattle<L, C, N, M> {
@@ -143,14 +150,22 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
             gamma += varied(vary, t, &rest(&from.q)).1.z;
         }
         let mut time = t;
+        let mut place = self.place(t, &step.end.q, vary);
         for g in &self.substeps {
             let h = g * self.h;
             drag(gamma * (0.5 * h), &mut step.end);
-            self.rattle(time, h, &mut step, vary)?;
+            place = self.rattle(time, h, (&mut step, &place), vary)?;
             drag(gamma * (0.5 * h), &mut step.end);
             time += h;
         }
         Ok(step)
+    }
+
+    /// What a substep needs of a position; the end of each substep is the start of the next.
+    fn place<T: Scalar, V: Vary<N, T>>(&self, t: f64, q: &SVector<T, N>, vary: &mut V) -> Place<N, M, T> {
+        let (_, jacobian) = vary.constraint(&self.constraint, q);
+        let (value, force) = self.kick(t, q, vary);
+        Place { value, force, jacobian }
     }
 
     /// `-V` and `-V_q` at a position.
@@ -181,35 +196,33 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         v
     }
 
-    /// RATTLE with the action.
+    /// RATTLE with the action, from a place to the one that it returns.
     fn rattle<T: Scalar, V: Vary<N, T>>(
         &self,
         t: f64,
         h: f64,
-        step: &mut RattleStep<N, M, T>,
+        (step, from): (&mut RattleStep<N, M, T>, &Place<N, M, T>),
         vary: &mut V,
-    ) -> Result<(), StepError> {
+    ) -> Result<Place<N, M, T>, StepError> {
         let PhasePoint { q: q0, mut p, mut z } = step.end;
-        let (value, force) = self.kick(t, &q0, vary);
-        let half = T::from(0.5 * h);
-        p += force * half;
-        z += value * half;
-        let (_, g0) = vary.constraint(&self.constraint, &q0);
+        let (half, g0) = (T::from(0.5 * h), &from.jacobian);
+        p += from.force * half;
+        z += from.value * half;
         let kept = self.redundancy.imposed(self.constraint.count(), &g0.map(|e| e.re()));
         // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's
         // method.
         let responses = self.inverse * g0.map(|e| e.re()).transpose();
         let mut corrections = Corrections::new();
-        let (mut q, mut c, mut g);
+        let mut q;
         loop {
             q = q0 + self.velocity(t, (&q0, &p), vary) * T::from(h);
-            (c, g) = vary.constraint(&self.constraint, &q);
-            let matrix = Factored::new(restricted(g.map(|e| e.re()) * responses * h, &kept))?;
+            let (mut c, g) = vary.constraint(&self.constraint, &q);
+            let system = SmallSystem::new(&restricted(g.map(|e| e.re()) * responses * h, &kept))?;
             mask(&mut c, &kept);
-            let impulse = matrix.solve(&c);
-            let push = g0.transpose() * impulse;
+            system.solve(c.as_mut_slice());
+            let push = g0.transpose() * c;
             p -= push;
-            step.impulse -= impulse;
+            step.impulse -= c;
             let moved = times(&self.inverse, &push) * T::from(h);
             if corrections.after(extent(&moved), extent(&q))? == Progress::Ended {
                 q -= moved;
@@ -218,26 +231,26 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         }
         let v = self.velocity(t, (&q0, &p), vary);
         z += dot(p, v) * half;
-        (_, g) = vary.constraint(&self.constraint, &q);
-        let (value, force) = self.kick(t + h, &q, vary);
-        p += force * half;
-        z += value * half;
+        let to = self.place(t + h, &q, vary);
+        p += to.force * half;
+        z += to.value * half;
+        let g = &to.jacobian;
         let real = g.map(|e| e.re());
-        let matrix = Factored::new(restricted(real * self.inverse * real.transpose(), &kept))?;
+        let system = SmallSystem::new(&restricted(real * self.inverse * real.transpose(), &kept))?;
         // The second pass completes the derivatives of dual numbers, the third removes round-off.
         for _ in 0..3 {
             let mut normal = g * self.velocity(t, (&q, &p), vary);
             mask(&mut normal, &kept);
-            let impulse = matrix.solve(&normal);
-            p -= g.transpose() * impulse;
-            step.impulse -= impulse;
+            system.solve(normal.as_mut_slice());
+            p -= g.transpose() * normal;
+            step.impulse -= normal;
         }
         if self.redundancy == Redundancy::LeastNorm {
             self.check_dependent(&q)?;
         }
         step.end = PhasePoint { q, p, z };
         let size = extent(&q) + extent(&p) + z.extent();
-        if size.is_finite() { Ok(()) } else { Err(StepError::NonFinite) }
+        if size.is_finite() { Ok(to) } else { Err(StepError::NonFinite) }
     }
 
     /// Checks that the constraints that were left out hold as well.
@@ -296,7 +309,7 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Step
             (self.state, self.impulse) = (step.end, step.impulse);
             self.sigma = (self.gamma * self.h).exp();
             self.taken += 1;
-            self.evaluations += 2 * self.substeps.len() as u64;
+            self.evaluations += 1 + self.substeps.len() as u64;
         }
         Ok(())
     }

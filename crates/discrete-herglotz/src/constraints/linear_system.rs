@@ -1,9 +1,10 @@
-//! Linear systems of a size that is known at run time, factorised once and solved for any numbers.
+//! Linear systems that are factorised once and solved for any numbers.
 
 use crate::StepError;
 use contact_geom::Scalar;
+use contact_geom::nalgebra::SMatrix;
 
-/// A square matrix with its LU factorisation by partial pivoting, rows scaled to their largest entry, since momenta and
+/// A square matrix of a size that is known at run time, with its LU factorisation by partial pivoting, rows scaled to their largest entry, since momenta and
 /// constraints have different units. The memory is allocated once.
 #[derive(Clone, Debug)]
 pub(super) struct LinearSystem {
@@ -30,65 +31,100 @@ impl LinearSystem {
 
     /// Factorises the matrix in place.
     pub fn factorise(&mut self) -> Result<(), StepError> {
-        let n = self.n;
-        for i in 0..n {
-            let row = &self.entries[i * n..(i + 1) * n];
-            let largest = contact_geom::numbers::max_abs_or_nan(row.iter().copied());
-            if !largest.is_finite() {
-                return Err(StepError::NonFinite);
-            }
-            if largest == 0.0 {
-                return Err(StepError::Singular { pivot: 0.0 });
-            }
-            self.scales[i] = largest.recip();
-            self.entries[i * n..(i + 1) * n].iter_mut().for_each(|e| *e /= largest);
-        }
-        for k in 0..n {
-            let mut row = k;
-            for i in k + 1..n {
-                if self.entries[i * n + k].abs() > self.entries[row * n + k].abs() {
-                    row = i;
-                }
-            }
-            self.rows[k] = row;
-            let pivot = self.entries[row * n + k];
-            // Below the round-off of the scaled rows a pivot is noise.
-            if pivot.is_nan() || pivot.abs() <= n as f64 * f64::EPSILON * f64::EPSILON {
-                return Err(StepError::Singular { pivot: pivot.abs() });
-            }
-            if row != k {
-                for j in 0..n {
-                    self.entries.swap(k * n + j, row * n + j);
-                }
-            }
-            for i in k + 1..n {
-                let factor = self.entries[i * n + k] / pivot;
-                self.entries[i * n + k] = factor;
-                for j in k + 1..n {
-                    self.entries[i * n + j] -= factor * self.entries[k * n + j];
-                }
-            }
-        }
-        Ok(())
+        factorise(&mut self.entries, &mut self.scales, &mut self.rows)
     }
 
     /// Replaces the right-hand side by the solution.
     pub fn solve<T: Scalar>(&self, b: &mut [T]) {
-        let n = self.n;
-        for (b, scale) in b.iter_mut().zip(&self.scales) {
-            *b = *b * *scale;
+        solve(&self.entries, &self.scales, &self.rows, b);
+    }
+}
+
+/// The same for a size that is known at compile time, without memory of its own.
+pub(super) struct SmallSystem<const N: usize> {
+    entries: [[f64; N]; N],
+    scales: [f64; N],
+    rows: [usize; N],
+}
+
+impl<const N: usize> SmallSystem<N> {
+    /// Factorises a matrix.
+    pub fn new(matrix: &SMatrix<f64, N, N>) -> Result<Self, StepError> {
+        let entries = std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]));
+        let mut system = SmallSystem { entries, scales: [1.0; N], rows: [0; N] };
+        factorise(system.entries.as_flattened_mut(), &mut system.scales, &mut system.rows)?;
+        Ok(system)
+    }
+
+    /// Replaces the right-hand side by the solution.
+    pub fn solve<T: Scalar>(&self, b: &mut [T]) {
+        solve(self.entries.as_flattened(), &self.scales, &self.rows, b);
+    }
+}
+
+/// Factorises a matrix that is given by rows.
+fn factorise(entries: &mut [f64], scales: &mut [f64], rows: &mut [usize]) -> Result<(), StepError> {
+    let n = rows.len();
+    for i in 0..n {
+        let row = &mut entries[i * n..(i + 1) * n];
+        let largest = contact_geom::numbers::max_abs_or_nan(row.iter().copied());
+        if !largest.is_finite() {
+            return Err(StepError::NonFinite);
         }
-        for k in 0..n {
-            b.swap(k, self.rows[k]);
+        if largest == 0.0 {
+            return Err(StepError::Singular { pivot: 0.0 });
         }
-        for i in 0..n {
-            let (row, (before, rest)) = (&self.entries[i * n..], b.split_at_mut(i));
-            before.iter().zip(row).for_each(|(b, entry)| rest[0] -= *b * *entry);
+        scales[i] = largest.recip();
+        row.iter_mut().for_each(|e| *e /= largest);
+    }
+    for k in 0..n {
+        let mut row = k;
+        for i in k + 1..n {
+            if entries[i * n + k].abs() > entries[row * n + k].abs() {
+                row = i;
+            }
         }
-        for i in (0..n).rev() {
-            let (row, (before, rest)) = (&self.entries[i * n..(i + 1) * n], b.split_at_mut(i + 1));
-            rest.iter().zip(&row[i + 1..]).for_each(|(b, entry)| before[i] -= *b * *entry);
-            before[i] = before[i] / row[i];
+        rows[k] = row;
+        let pivot = entries[row * n + k];
+        // Below the round-off of the scaled rows a pivot is noise.
+        if pivot.is_nan() || pivot.abs() <= n as f64 * f64::EPSILON * f64::EPSILON {
+            return Err(StepError::Singular { pivot: pivot.abs() });
         }
+        if row != k {
+            for j in 0..n {
+                entries.swap(k * n + j, row * n + j);
+            }
+        }
+        for i in k + 1..n {
+            let factor = entries[i * n + k] / pivot;
+            entries[i * n + k] = factor;
+            // Entries that vanish, as those of constraints that are not there, change nothing.
+            if factor != 0.0 {
+                for j in k + 1..n {
+                    entries[i * n + j] -= factor * entries[k * n + j];
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Replaces the right-hand side of a system in factors by the solution.
+fn solve<T: Scalar>(entries: &[f64], scales: &[f64], rows: &[usize], b: &mut [T]) {
+    let n = rows.len();
+    for (b, scale) in b.iter_mut().zip(scales) {
+        *b = *b * *scale;
+    }
+    for (k, row) in rows.iter().enumerate() {
+        b.swap(k, *row);
+    }
+    for i in 0..n {
+        let (row, (before, rest)) = (&entries[i * n..], b.split_at_mut(i));
+        before.iter().zip(row).for_each(|(b, entry)| rest[0] -= *b * *entry);
+    }
+    for i in (0..n).rev() {
+        let (row, (before, rest)) = (&entries[i * n..(i + 1) * n], b.split_at_mut(i + 1));
+        rest.iter().zip(&row[i + 1..]).for_each(|(b, entry)| before[i] -= *b * *entry);
+        before[i] = before[i] / row[i];
     }
 }

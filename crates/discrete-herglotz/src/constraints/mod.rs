@@ -12,7 +12,6 @@
 
 mod constrained;
 mod drag_rattle;
-mod factored;
 mod lagrange_d_alembert;
 mod linear_system;
 mod lobatto;

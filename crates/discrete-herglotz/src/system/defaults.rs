@@ -8,21 +8,16 @@ use contact_geom::numbers::max_abs_or_nan;
 use contact_geom::support::linear;
 use contact_geom::{Defect, Defects, GeometryError, nalgebra::DVector};
 
-/// The distance of two times, relative to their size, of the difference quotient for `L_vt`.
-const TIME_DIFFERENCE: f64 = 1e-5;
-
-/// The Herglotz vector field `(v, a, L)` with the rate `L_z`: `W a = L_q + f + L_z L_v - L_vt - L_vq v - L_vz L`, where `L_vt`
-/// is a difference quotient.
+/// The Herglotz vector field `(v, a, L)` with the rate `L_z`: `W a = L_q + f + L_z L_v - L_vt - L_vq v - L_vz L`.
 pub(super) fn rates(system: &(impl System + ?Sized), t: f64, x: &Point) -> Result<(Components, f64), GeometryError> {
     let (l, mut g, h) = (system.value(t, x), system.gradient(t, x), system.hessian(t, x));
     if system.hints().forced {
         g.x += system.applied_force(t, x);
     }
-    let dt = TIME_DIFFERENCE * (1.0 + t.abs());
-    let [after, before] = [t + dt, t - dt].map(|t| system.gradient(t, x).y);
+    let l_vt = system.in_quantity(Quantity::Time, t, x).gradient.y;
     let mut a = DVector::from_fn(x.q.len(), |i, _| {
         let along: f64 = x.v.iter().enumerate().map(|(j, v)| h.qv[(j, i)] * v).sum();
-        g.x[i] + g.z * g.y[i] - (after[i] - before[i]) / (2.0 * dt) - along - h.vz[i] * l
+        g.x[i] + g.z * g.y[i] - l_vt[i] - along - h.vz[i] * l
     });
     let mut w = h.vv;
     let remedy = "the acceleration is defined only for a regular Lagrangian";

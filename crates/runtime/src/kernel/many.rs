@@ -26,7 +26,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// A formula without constraints, in any number of coordinates: it runs by contact Gauss collocation.
-pub(super) struct ManyCoordinates(Arc<FormulaDerivatives>);
+pub(super) struct ManyCoordinates(pub Arc<FormulaDerivatives>);
 
 /// What a formula with many coordinates has no kernel for.
 pub(super) fn few(what: &'static str) -> RuntimeError {
@@ -268,7 +268,7 @@ impl Kernel for ManyCoordinates {
         self.0.has_force()
     }
 
-    fn derivatives(&self) -> Option<&FormulaDerivatives> {
+    fn derivatives(&self) -> Option<&Arc<FormulaDerivatives>> {
         Some(&self.0)
     }
 
@@ -281,7 +281,7 @@ impl Kernel for ManyCoordinates {
     }
 
     fn rates(&self, t: f64, y: &[f64], to: &mut [f64]) {
-        geometry::rates_of_many(&self.0, t, y, to);
+        geometry::rates_of_many(self, t, y, to);
     }
 
     fn point(&self, at: &Start) -> Result<Point, RuntimeError> {

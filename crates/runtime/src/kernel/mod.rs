@@ -53,11 +53,11 @@ pub(crate) trait Kernel: Send + Sync {
     fn is_smooth(&self) -> bool;
     fn has_force(&self) -> bool;
     /// The derivatives of a Lagrangian formula, over the number of coordinates of the kernel; `None` of a Hamiltonian.
-    fn derivatives(&self) -> Option<&FormulaDerivatives> {
+    fn derivatives(&self) -> Option<&Arc<FormulaDerivatives>> {
         None
     }
     fn symmetries(&self) -> Vec<FormulaSymmetry> {
-        self.derivatives().map_or_else(Vec::new, FormulaDerivatives::symmetries)
+        self.derivatives().map_or_else(Vec::new, |derivatives| derivatives.symmetries())
     }
     /// The proved structure of a Hamiltonian; `None` for a Lagrangian.
     fn hamiltonian_structure(&self) -> Option<HamiltonianStructure> {
@@ -195,7 +195,7 @@ impl<const N: usize> Kernel for Sized<FormulaLagrangian<N>, N> {
         Lagrangian::has_force(&self.0)
     }
 
-    fn derivatives(&self) -> Option<&FormulaDerivatives> {
+    fn derivatives(&self) -> Option<&Arc<FormulaDerivatives>> {
         Some(self.0.derivatives())
     }
 
