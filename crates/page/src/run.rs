@@ -128,8 +128,14 @@ fn of_lattice(scene: &LatticeScene) -> Result<Value, Value> {
     let outcome = outcome.map_err(|error| at(&scene.explain(&error)))?;
     let is_right = matches!(outcome.status, Status::Completed | Status::Stopped { .. });
     let mut answer = result(&recorder, (&outcome.status.to_string(), is_right), outcome.t);
+    let by = scene.motion.by.to_string();
+    let text = match scene.motion.steps {
+        Steps::Size(h) => format!("{by} with the given steps of {h}"),
+        Steps::Count(count) => format!("{by} with {count} given steps"),
+    };
     let more = json!({
         "columns": scene.columns(),
+        "plan": { "text": format!("{text}: a lattice of many sites has no accuracy\n"), "integrator": by },
         "of_events": [],
         "steps": outcome.steps,
         "evaluations": outcome.evaluations,

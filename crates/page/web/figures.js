@@ -105,8 +105,11 @@ const againstTime = (rows, names, label, peer) =>
   );
 
 /// Dissipated quantities, with what the conformal factor predicts from their first values: dashed, and on the curve if the law holds.
-const dissipated = (rows, names, label, peer) => {
-  const factor = rows.has("log_factor") ? rows.column("log_factor") : undefined;
+/// The factor is that of the rows, or that of a constant rate.
+const dissipated = (rows, names, label, { peer, gamma } = {}) => {
+  const t = rows.column("t");
+  const ofRate = gamma === undefined ? undefined : (row) => gamma * t(row);
+  const factor = rows.has("log_factor") ? rows.column("log_factor") : ofRate;
   const predicted = (name) => {
     const of = rows.column(name);
     return (row) => of(0) * Math.exp(factor(row) - factor(0));
@@ -119,7 +122,7 @@ const dissipated = (rows, names, label, peer) => {
       ...(factor
         ? names.map((name) =>
             Plot.line(rows.drawn(), {
-              x: rows.column("t"),
+              x: t,
               y: predicted(name),
               stroke: () => "exact factor",
               strokeDasharray: DASHED,
@@ -218,11 +221,11 @@ const ofFormula = (scene, rows, { coordinate, peer, answer }) => {
   figures.push({
     name: "energy",
     title: keepsEnergy(scene) ? "Energy, and what the conformal factor predicts" : "Energy, which forces, resets or the time change",
-    svg: keepsEnergy(scene) ? dissipated(rows, ["energy"], "energy", peer) : againstTime(rows, ["energy"], "energy", peer),
+    svg: keepsEnergy(scene) ? dissipated(rows, ["energy"], "energy", { peer }) : againstTime(rows, ["energy"], "energy", peer),
   });
   if (scene.symmetries.length) {
     const momenta = scene.symmetries.slice(0, MOST_CURVES);
-    figures.push({ name: "momenta", title: "Dissipated momenta of the symmetries", svg: dissipated(rows, momenta, "momenta", peer) });
+    figures.push({ name: "momenta", title: "Dissipated momenta of the symmetries", svg: dissipated(rows, momenta, "momenta", { peer }) });
   }
   figures.push({ name: "action", title: "Action z", svg: againstTime(rows, [scene.action], scene.action, peer) });
   if (answer.events?.length) {
@@ -260,23 +263,10 @@ const ofBody = (rows, answer) => {
     { name: "tip", title: "Path of the centre of mass from above", svg: inPlane(rows, "tip_x", "tip_y", { frame: SPACE }) },
     { name: "height", title: "Height of the centre of mass", svg: againstTime(rows, ["tip_z"], "tip_z") },
     { name: "polhode", title: "Momentum in the body", svg: againstTime(rows, ["Pi1", "Pi2", "Pi3"], "Pi") },
-    { name: "energy", title: "Energy", svg: withFactor(rows, ["energy"], "energy", answer.gamma) },
+    { name: "energy", title: "Energy", svg: dissipated(rows, ["energy"], "energy", { gamma: answer.gamma }) },
     { name: "momenta", title: "Momenta about the vertical and the axis of the body", svg: againstTime(rows, momenta, "M3, Pi3") },
     { name: "action", title: "Action z", svg: againstTime(rows, ["z"], "z") },
   ];
-};
-
-/// The same as `dissipated` at a constant rate.
-const withFactor = (rows, names, label, gamma) => {
-  const [t, of] = [rows.column("t"), rows.column(names[0])];
-  const predicted = (row) => of(0) * Math.exp(gamma * (t(row) - t(0)));
-  return frame(
-    [
-      curve(rows, "t", names[0], { stroke: () => names[0], strokeWidth: 2 }),
-      Plot.line(rows.drawn(), { x: t, y: predicted, stroke: () => "exact factor", strokeDasharray: DASHED }),
-    ],
-    { x: { label: "t" }, y: { label }, names: [...names, "exact factor"] },
-  );
 };
 
 const ofLattice = (scene, rows) => {

@@ -66,11 +66,12 @@ pub struct RattleStep<const N: usize, const M: usize, T = f64> {
     pub impulse: SVector<T, M>,
 }
 
-/// `-V`, `-V_q` and `G = c_q` at a position.
+/// `-V`, `-V_q` and `G = c_q` at a position, and the responses `M^-1 G^T` of the velocity to impulses, as real numbers.
 struct Place<const N: usize, const M: usize, T> {
     value: T,
     force: SVector<T, N>,
     jacobian: SMatrix<T, M, N>,
+    responses: SMatrix<f64, N, M>,
 }
 
 impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> DragRattle<L, C, N, M> {
@@ -165,7 +166,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
     fn place<T: Scalar, V: Vary<N, T>>(&self, t: f64, q: &SVector<T, N>, vary: &mut V) -> Place<N, M, T> {
         let (_, jacobian) = vary.constraint(&self.constraint, q);
         let (value, force) = self.kick(t, q, vary);
-        Place { value, force, jacobian }
+        let responses = self.inverse * jacobian.map(|e| e.re()).transpose();
+        Place { value, force, jacobian, responses }
     }
 
     /// `-V` and `-V_q` at a position.
@@ -208,25 +210,37 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         let (half, g0) = (T::from(0.5 * h), &from.jacobian);
         p += from.force * half;
         z += from.value * half;
-        let kept = self.redundancy.imposed(self.constraint.count(), &g0.map(|e| e.re()));
-        // The responses M^-1 G(q0)^T of the position to the impulses, as real numbers, for the matrix of Newton's
-        // method.
-        let responses = self.inverse * g0.map(|e| e.re()).transpose();
-        let mut corrections = Corrections::new();
+        let count = self.constraint.count();
+        let kept = self.redundancy.imposed(count, &g0.map(|e| e.re()));
+        let system = |g: &SMatrix<T, M, N>, responses| {
+            SmallSystem::new(&restricted(g.map(|e| e.re()) * responses, &kept), count)
+        };
+        let responses = from.responses * h;
+        let (mut corrections, mut known) = (Corrections::new(), None);
         let mut q;
         loop {
             q = q0 + self.velocity(t, (&q0, &p), vary) * T::from(h);
-            let (mut c, g) = vary.constraint(&self.constraint, &q);
-            let system = SmallSystem::new(&restricted(g.map(|e| e.re()) * responses * h, &kept))?;
+            // The matrix of the first iteration is at the position without constraints, which is near: it is kept unless that is slow.
+            let (mut c, solver) = match known.take() {
+                Some(solver) => (vary.constraint_values(&self.constraint, &q), solver),
+                None => {
+                    let (c, g) = vary.constraint(&self.constraint, &q);
+                    (c, system(&g, responses)?)
+                }
+            };
             mask(&mut c, &kept);
-            system.solve(c.as_mut_slice());
+            solver.solve(c.as_mut_slice());
             let push = g0.transpose() * c;
             p -= push;
             step.impulse -= c;
             let moved = times(&self.inverse, &push) * T::from(h);
-            if corrections.after(extent(&moved), extent(&q))? == Progress::Ended {
-                q -= moved;
-                break;
+            match corrections.after(extent(&moved), extent(&q))? {
+                Progress::Ended => {
+                    q -= moved;
+                    break;
+                }
+                Progress::Continues => known = Some(solver),
+                Progress::Slow => {}
             }
         }
         let v = self.velocity(t, (&q0, &p), vary);
@@ -235,13 +249,12 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         p += to.force * half;
         z += to.value * half;
         let g = &to.jacobian;
-        let real = g.map(|e| e.re());
-        let system = SmallSystem::new(&restricted(real * self.inverse * real.transpose(), &kept))?;
+        let solver = system(g, to.responses)?;
         // The second pass completes the derivatives of dual numbers, the third removes round-off.
         for _ in 0..3 {
             let mut normal = g * self.velocity(t, (&q, &p), vary);
             mask(&mut normal, &kept);
-            system.solve(normal.as_mut_slice());
+            solver.solve(normal.as_mut_slice());
             p -= g.transpose() * normal;
             step.impulse -= normal;
         }

@@ -40,25 +40,28 @@ impl LinearSystem {
     }
 }
 
-/// The same for a size that is known at compile time, without memory of its own.
+/// The same for a size of at most N, without memory of its own.
 pub(super) struct SmallSystem<const N: usize> {
+    n: usize,
     entries: [[f64; N]; N],
     scales: [f64; N],
     rows: [usize; N],
 }
 
 impl<const N: usize> SmallSystem<N> {
-    /// Factorises a matrix.
-    pub fn new(matrix: &SMatrix<f64, N, N>) -> Result<Self, StepError> {
-        let entries = std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]));
-        let mut system = SmallSystem { entries, scales: [1.0; N], rows: [0; N] };
-        factorise(system.entries.as_flattened_mut(), &mut system.scales, &mut system.rows)?;
+    /// Factorises the first n rows and columns of a matrix.
+    pub fn new(matrix: &SMatrix<f64, N, N>, n: usize) -> Result<Self, StepError> {
+        let mut system = SmallSystem { n, entries: [[0.0; N]; N], scales: [1.0; N], rows: [0; N] };
+        let entries = &mut system.entries.as_flattened_mut()[..n * n];
+        entries.iter_mut().enumerate().for_each(|(k, entry)| *entry = matrix[(k / n, k % n)]);
+        factorise(entries, &mut system.scales[..n], &mut system.rows[..n])?;
         Ok(system)
     }
 
-    /// Replaces the right-hand side by the solution.
+    /// Replaces the first n entries of a right-hand side by the solution.
     pub fn solve<T: Scalar>(&self, b: &mut [T]) {
-        solve(self.entries.as_flattened(), &self.scales, &self.rows, b);
+        let n = self.n;
+        solve(&self.entries.as_flattened()[..n * n], &self.scales[..n], &self.rows[..n], &mut b[..n]);
     }
 }
 

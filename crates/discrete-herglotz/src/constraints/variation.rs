@@ -21,6 +21,15 @@ pub(super) trait Vary<const N: usize, T> {
         constraint: &impl Constraint<N, M>,
         q: &SVector<T, N>,
     ) -> (SVector<T, M>, SMatrix<T, M, N>);
+
+    /// The values alone.
+    fn constraint_values<const M: usize>(
+        &self,
+        constraint: &impl Constraint<N, M>,
+        q: &SVector<T, N>,
+    ) -> SVector<T, M> {
+        self.constraint(constraint, q).0
+    }
 }
 
 /// The Lagrangian itself.
@@ -37,6 +46,14 @@ impl<const N: usize, T: Scalar> Vary<N, T> for Unvaried {
         q: &SVector<T, N>,
     ) -> (SVector<T, M>, SMatrix<T, M, N>) {
         constraint.with_jacobian(q)
+    }
+
+    fn constraint_values<const M: usize>(
+        &self,
+        constraint: &impl Constraint<N, M>,
+        q: &SVector<T, N>,
+    ) -> SVector<T, M> {
+        constraint.value(q)
     }
 }
 

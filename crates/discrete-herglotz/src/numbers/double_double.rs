@@ -1,6 +1,6 @@
 //! Double-double arithmetic on rows of numbers, in SIMD lanes with fused multiply-add.
 
-use crate::numbers::compensated::exact_sum;
+use crate::numbers::compensated::{exact_sum, lost_in_product, product_plus};
 use crate::numbers::instructions::Instructions;
 use pulp::{Simd, WithSimd};
 use qd::Quad;
@@ -24,9 +24,9 @@ fn renormalised(head: f64, tail: f64) -> (f64, f64) {
 #[inline(always)]
 fn sum_of_product(sum: (f64, f64), factor: Quad, x: (f64, f64)) -> (f64, f64) {
     let product = factor.0 * x.0;
-    let lost = factor.0.mul_add(x.0, -product);
+    let lost = lost_in_product(factor.0, x.0, product);
     let (head, rounding) = exact_sum(sum.0, product);
-    renormalised(head, (sum.1 + rounding) + factor.1.mul_add(x.0, factor.0.mul_add(x.1, lost)))
+    renormalised(head, (sum.1 + rounding) + product_plus(factor.1, x.0, product_plus(factor.0, x.1, lost)))
 }
 
 impl<const W: usize> ExactRow<W> {

@@ -5,7 +5,7 @@
 
 use crate::gauss::limits::MIN_PIVOT;
 use crate::gauss::tables::coefficients::{Coefficients, MAX_STAGES};
-use crate::numbers::compensated::{Unevaluated, exact_sum};
+use crate::numbers::compensated::{Unevaluated, exact_sum, lost_in_product, product_plus};
 use crate::numbers::double_double::{ExactRow, solve_exactly};
 use crate::numbers::instructions::Instructions;
 use crate::numbers::lanes::Lanes;
@@ -243,13 +243,13 @@ impl Condensed {
             for k in 0..s {
                 let Quad(b, b_tail) = self.b[i][k];
                 let factor = -kappa * b;
-                let factor_tail = (-kappa).mul_add(b, -factor) - kappa * b_tail;
+                let factor_tail = lost_in_product(-kappa, b, factor) - kappa * b_tail;
                 for j in 0..MAX_STAGES + 2 {
                     let product = factor * rows[k][j];
-                    let error = factor.mul_add(rows[k][j], -product);
+                    let error = lost_in_product(factor, rows[k][j], product);
                     let (total, rounding) = exact_sum(sum[j], product);
                     sum[j] = total;
-                    lost[j] += factor_tail.mul_add(rows[k][j], error + rounding);
+                    lost[j] += product_plus(factor_tail, rows[k][j], error + rounding);
                 }
             }
             residual[i] = from_fn(|j| sum[j] + lost[j]);
