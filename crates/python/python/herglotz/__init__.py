@@ -17,6 +17,7 @@ equation,
 
 from importlib import import_module as _import_module
 
+from . import _processor  # noqa: F401
 from ._additions import table
 from ._core import System, Table
 from ._core import catalogue as _catalogue
