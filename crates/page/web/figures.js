@@ -94,6 +94,19 @@ const frame = (marks, { names = [], ...options }) => {
 
 const curve = (rows, x, y, options) => Plot.line(rows.drawn(), { x: rows.column(x), y: rows.column(y), ...options });
 
+/// The smallest part of its values over which an axis extends: below it, its labels would differ in the last digits alone.
+const SMALLEST_RANGE = 1e-3;
+
+/// The axis of columns of some motions: around values that hardly differ, such as an energy that is kept to round-off, a wider one than theirs.
+const axisOf = (motions, names, label) => {
+  const of = (rows) => names.flatMap((name) => rows.drawn().map(rows.column(name)));
+  const values = motions.flatMap((rows) => (rows ? of(rows) : [])).filter(Number.isFinite);
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const half = (SMALLEST_RANGE / 2) * Math.max(Math.abs(low), Math.abs(high));
+  const middle = (low + high) / 2;
+  return { label, ...(high - low < 2 * half ? { domain: [middle - half, middle + half] } : {}) };
+};
+
 /// Columns against time, each with its name.
 const againstTime = (rows, names, label, peer) =>
   frame(
@@ -101,7 +114,7 @@ const againstTime = (rows, names, label, peer) =>
       ...names.map((name) => curve(rows, "t", name, { stroke: () => name })),
       ...(peer ? names.map((name) => curve(peer, "t", name, { stroke: () => name, strokeDasharray: "1,3" })) : []),
     ],
-    { x: { label: "t" }, y: { label }, names },
+    { x: { label: "t" }, y: axisOf([rows, peer], names, label), names },
   );
 
 /// Dissipated quantities, with what the conformal factor predicts from their first values: dashed, and on the curve if the law holds.
@@ -130,7 +143,7 @@ const dissipated = (rows, names, label, { peer, gamma } = {}) => {
           )
         : []),
     ],
-    { x: { label: "t" }, y: { label }, names: shown },
+    { x: { label: "t" }, y: axisOf([rows, peer], names, label), names: shown },
   );
 };
 
