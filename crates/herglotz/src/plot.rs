@@ -63,13 +63,8 @@ pub(crate) fn of_path(scene: &EndsScene, rows: &[Vec<f64>]) -> Vec<(String, Stri
 }
 
 fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[Vec<f64>]) -> Vec<(String, String)> {
-    let stride = rows.len().div_ceil(MAX_POINTS).max(1);
-    let of = |i: usize, j: usize| -> Vec<(f64, f64)> {
-        let points = rows.iter().step_by(stride).chain(rows.last());
-        points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
-    };
     let position = |is_requested: &dyn Fn(&Column) -> bool| columns.iter().position(|(_, column)| is_requested(column));
-    let of_pair = |i: usize, j: usize| panel([columns.get(i)?.0, columns.get(j)?.0], Line::Solid, of(i, j));
+    let of_pair = |i: usize, j: usize| panel([columns.get(i)?.0, columns.get(j)?.0], Line::Solid, points(rows, i, j));
     let mut figures = Vec::new();
     if let Some(t) = position(&|column| matches!(column, Column::Time)) {
         let panels: Vec<Panel> = (0..columns.len()).filter(|i| *i != t).filter_map(|i| of_pair(t, i)).collect();
@@ -90,6 +85,13 @@ fn of_columns(columns: Vec<(Quantity<'_>, &Column)>, dimension: usize, rows: &[V
         figures.extend(of_pair(*x, *y).map(|panel| ("path.svg".to_owned(), draw(&panel))));
     }
     figures
+}
+
+/// The points of a column j against a column i, as many as a figure resolves.
+fn points(rows: &[Vec<f64>], i: usize, j: usize) -> Vec<(f64, f64)> {
+    let stride = rows.len().div_ceil(MAX_POINTS).max(1);
+    let points = rows.iter().step_by(stride).chain(rows.last());
+    points.filter_map(|row| Some((*row.get(i)?, *row.get(j)?))).filter(|(x, y)| (x + y).is_finite()).collect()
 }
 
 /// The figure of a section: velocities against coordinates where the first event changes sign.
@@ -280,6 +282,9 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
         .take(scene.sizes.len().saturating_sub(1))
         .map(|(size, stride)| size / 2 * stride)
         .sum();
+    if scene.has_columns() {
+        return of_chosen(&scene.columns(), rows);
+    }
     let name = scene.coordinates.first().map_or("x", String::as_str);
     let value = |row: &[f64], i: usize| Some((*row.first()?, *row.get(1 + d * (first + i))?));
     let mut figures = Vec::new();
@@ -319,6 +324,16 @@ pub(crate) fn of_lattice(scene: &LatticeScene, rows: &[Vec<f64>]) -> Vec<(String
         .collect();
     figures.extend((!panels.is_empty()).then(|| ("sites.svg".to_owned(), grid(&panels))));
     figures
+}
+
+/// The columns that the scene of a lattice chooses, against time if it is among them.
+fn of_chosen(names: &[String], rows: &[Vec<f64>]) -> Vec<(String, String)> {
+    let Some(t) = names.iter().position(|name| name == "t") else { return Vec::new() };
+    let panels: Vec<Panel> = (0..names.len())
+        .filter(|i| *i != t)
+        .filter_map(|i| panel([Quantity::plain("t"), Quantity::plain(names.get(i)?)], Line::Solid, points(rows, t, i)))
+        .collect();
+    if panels.is_empty() { Vec::new() } else { vec![("columns.svg".to_owned(), grid(&panels))] }
 }
 
 #[cfg(test)]

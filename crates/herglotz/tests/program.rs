@@ -500,7 +500,7 @@ fn a_lattice_runs() {
     let by_gauss = at.write("gauss.toml", &LATTICE.replace("blanes_moan_6", "gauss_4"));
     assert!(succeed(&["plan", &by_gauss]).starts_with("60 steps of 0.05 by gauss_4"));
     let large = at.write("large.toml", &LATTICE.replace("[2, 20]", "[2, 200]"));
-    for command in ["plan", "check", "compare", "sweep", "fit"] {
+    for command in ["check", "compare", "sweep", "fit"] {
         let (code, said) = fail(&[command, &large]);
         assert!(code == Some(2) && said.contains("it can have from 1 to 256"), "{command}: {said}");
     }
@@ -627,13 +627,50 @@ fn wrong_lattices_are_refused() {
             "accuracy = 1e-9",
             "line 14, column 12: `accuracy` takes a formula, which has at most 256 coordinates",
         ),
-        ("every = 1.0", "columns = [\"t\"]", "line 16, column 11: `columns` takes a formula"),
+        (
+            "every = 1.0",
+            "columns = [\"t\", \"2*x[0]\"]",
+            "line 16, column 17: `2*x[0]` is no column; those of a lattice",
+        ),
+        (
+            "every = 1.0",
+            "columns = [\"x'[40]\"]",
+            "are t, z, energy, log_factor, and of each site such names as x[39], x'[39] and p_x[39]",
+        ),
+        ("every = 1.0", "columns = []", "line 16, column 11: `columns` is empty"),
     ];
     refuses_each(LATTICE, &changes, |text| match herglotz::LatticeScene::read(text) {
         Err(error) => Some(error.to_string()),
         // Errors that are found when the lattice is run.
         Ok(scene) => scene.system.run(&scene.motion, &mut ()).err().map(|error| scene.explain(&error).to_string()),
     });
+}
+
+/// The columns that a scene of many sites chooses are those of the whole state.
+#[test]
+fn many_sites_have_columns() {
+    let at = Directory::new("columns");
+    let text = LATTICE.replace("[2, 20]", "[20, 20]");
+    let rows = |name: &str, columns: &str| {
+        let file = at.write(name, &text.replace("every = 1.0", &format!("every = 1.0\n{columns}")));
+        succeed(&["run", &file, "--out", &at.path("out"), "--plot"]);
+        at.read("out/rows.csv")
+    };
+    let whole = rows("whole.toml", "");
+    let names = ["log_factor", "p_x[399]", "x[3]", "x'[250]", "energy", "z", "t"];
+    let chosen = rows("chosen.toml", &format!("columns = {names:?}"));
+    assert_eq!(chosen.lines().next().unwrap(), names.join(","));
+    for name in &names[1..] {
+        assert_eq!(column(&chosen, name), column(&whole, name), "{name}");
+    }
+    assert!(at.read("out/columns.svg").contains("x[3]"));
+    // The rate of L is gamma, -0.1.
+    let (t, log) = (column(&chosen, "t"), column(&chosen, "log_factor"));
+    assert!(t.len() == 4 && t.iter().zip(&log).all(|(t, log)| (log + 0.1 * t).abs() < 1e-12), "{log:?}");
+    assert_eq!(
+        succeed(&["plan", &at.path("chosen.toml")]),
+        "60 steps of 0.05 by blanes_moan_6, t = 0 to 3\n400 sites; steps and integrator are as given\n"
+    );
 }
 
 /// A small coordinate that grows quickly is resolved where the scene gives its scale.

@@ -4,7 +4,9 @@ use crate::numbers::named;
 use crate::recorder::Recorder;
 use crate::request::{By, Deadline, Request, answer, at, of_motion, refusal};
 use crate::runge_kutta;
-use herglotz::runtime::{Body, BodyMotion, Column, Crossing, GroupStatus, Motion, Plan, Status, StepControl, Steps};
+use herglotz::runtime::{
+    Body, BodyMotion, Column, Crossing, GroupStatus, Motion, Plan, SiteMotion, Status, StepControl, Steps,
+};
 use herglotz::{AnyScene, BodyScene, LatticeScene, Scene};
 use serde_json::{Value, json};
 
@@ -123,19 +125,16 @@ fn of_body(scene: &BodyScene) -> Result<Value, Value> {
 fn of_lattice(scene: &LatticeScene) -> Result<Value, Value> {
     let of_event = |_: &Crossing| Vec::new();
     let mut recorder = Recorder::new(Deadline::new(), &of_event);
-    let outcome = scene.system.run(&scene.motion, &mut recorder);
+    // The figures show all sites.
+    let motion = SiteMotion { columns: None, conformal_factor: false, ..scene.motion.clone() };
+    let outcome = scene.system.run(&motion, &mut recorder);
     recorder.finish();
     let outcome = outcome.map_err(|error| at(&scene.explain(&error)))?;
     let is_right = matches!(outcome.status, Status::Completed | Status::Stopped { .. });
     let mut answer = result(&recorder, (&outcome.status.to_string(), is_right), outcome.t);
-    let by = scene.motion.by.to_string();
-    let text = match scene.motion.steps {
-        Steps::Size(h) => format!("{by} with the given steps of {h}"),
-        Steps::Count(count) => format!("{by} with {count} given steps"),
-    };
     let more = json!({
-        "columns": scene.columns(),
-        "plan": { "text": format!("{text}: a lattice of many sites has no accuracy\n"), "integrator": by },
+        "columns": scene.columns_of_state(),
+        "plan": { "text": scene.plan().unwrap_or_default(), "integrator": scene.motion.by.to_string() },
         "of_events": [],
         "steps": outcome.steps,
         "evaluations": outcome.evaluations,

@@ -83,6 +83,17 @@ def test_lattices_run_by_sparse_integrators_or_as_formulas(tmp_path):
         hz.run(written(tmp_path, LATTICE.replace('x = "sin(i + j/n) + k"\n', "")))
 
 
+def test_columns_of_many_sites_are_those_of_the_state(tmp_path):
+    def with_columns(names):
+        return written(tmp_path, LATTICE.replace("[2, 10]", "[2, 150]") + f"[want]\nrows = {{ every = 0.5, columns = {names} }}\n")
+
+    sol = hz.run(with_columns(["t", "x[299]", "x'[0]", "p_x[7]", "energy", "log_factor"]))
+    # gamma = -0.1.
+    assert sol["q[1, 149]"].shape == (3,) and np.allclose(sol["log_factor"], -0.1 * sol["t"], rtol=0, atol=1e-14)
+    with pytest.raises(ValueError, match="accuracy, events and columns"):
+        hz.run(with_columns(["t", "2*x[0]"]))
+
+
 def test_bodies_refuse_what_does_not_apply(tmp_path):
     body = (SCENES / "heavy_top.toml").read_text()
     assert hz.run(written(tmp_path, body), {"mass": 14.0}).success

@@ -1,11 +1,11 @@
 //! `herglotz plan`.
 
-use super::scene_arguments::{FormulaOrBody, SceneArguments};
+use super::scene_arguments::SceneArguments;
 use crate::failure::Failure;
 use crate::output::{print, print_json};
 use clap::Args;
 use herglotz::runtime::RuntimeError;
-use herglotz::{BodyScene, Property};
+use herglotz::{AnyScene, BodyScene, LatticeScene, Property};
 
 #[derive(Args)]
 pub(crate) struct Plan {
@@ -30,9 +30,12 @@ struct Facts {
 
 impl Plan {
     pub fn run(&self) -> Result<(), Failure> {
-        let scene = match self.scene.read_formula_or_body()? {
-            FormulaOrBody::Formula(scene) => scene,
-            FormulaOrBody::Body(scene) => return self.plan_body(&scene),
+        let scene = match self.scene.read_any()? {
+            AnyScene::Motion(scene) => scene,
+            AnyScene::Body(scene) => return self.plan_body(&scene),
+            AnyScene::Lattice(scene) if !scene.is_a_formula() => return self.plan_lattice(&scene),
+            // A lattice of few sites is a formula as well; a path is refused.
+            AnyScene::Lattice(_) | AnyScene::Path(_) => Box::new(self.scene.read()?),
         };
         let plan = scene.system.plan(&scene.motion()).map_err(|error| self.scene.explain(scene.explain(&error)))?;
         let facts = Facts {
@@ -55,6 +58,19 @@ impl Plan {
             members: (scene.combinations().count(), !scene.swept.is_empty()),
         };
         self.print(&plan, &facts)
+    }
+
+    /// The plan of a scene of a lattice with many sites.
+    fn plan_lattice(&self, scene: &LatticeScene) -> Result<(), Failure> {
+        let explain = |error: RuntimeError| self.scene.explain(scene.explain(&error));
+        if !self.json {
+            return print(scene.plan().map_err(explain)?.trim_end());
+        }
+        let (step_size, steps) = scene.motion.step().map_err(explain)?;
+        let integrator = scene.motion.by.to_string();
+        print_json(
+            &serde_json::json!({ "integrator": integrator, "step_size": step_size, "steps": steps, "sites": scene.sizes }),
+        )
     }
 
     fn print(&self, plan: &herglotz::runtime::Plan, facts: &Facts) -> Result<(), Failure> {

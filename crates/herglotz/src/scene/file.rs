@@ -139,7 +139,8 @@ pub(crate) struct SystemTable {
     pub constraints: Option<Location<Vec<Location<String>>>>,
     /// In place of L, a lattice. `coordinates` are then the components at a site, by default `x`; in all other formulas they are
     /// `x[0]`, `x[1]` and so on, or with several components `x_0`, `y_0`, `x_1` and so on. With more than 256 coordinates a
-    /// lattice runs with given steps of a splitting, of `midpoint`, `gauss_1` or `gauss_2`, and its rows are the whole state.
+    /// lattice runs with given steps of a splitting, of `midpoint`, `gauss_1` or `gauss_2`, and its columns are names of the state,
+    /// without formulas.
     pub lattice: Option<Location<LatticeTerms>>,
     /// In place of L, bodies with Newtonian gravitation.
     pub bodies: Option<Location<BodiesTerms>>,

@@ -6,7 +6,7 @@ use super::file;
 use super::file::{File, RunTable, WantTable};
 use super::location::{Location, Span};
 use super::only::{refuse_all, set, span};
-use super::output::RowTimes;
+use super::output::{self, RowTimes};
 use super::start::{self, StartNames};
 use super::step_control::step_control;
 use super::sum_of_terms::{explain, lattice, spans_of_lattice};
@@ -32,6 +32,7 @@ pub struct LatticeScene {
     pub coordinates: Vec<String>,
     /// The number of sites along each direction.
     pub sizes: Vec<usize>,
+    chosen: Option<Vec<String>>,
     text: String,
     spans: [(&'static str, Span); 6],
     run: Span,
@@ -56,9 +57,7 @@ fn is_sparse(by: &str) -> bool {
 fn of_formulas(file: &File) -> Vec<(Option<Span>, &'static str)> {
     let (run, want, system) = (&*file.run, &file.want, &*file.system);
     let of_events = want.events.first().map(|event| event.when.span());
-    let columns = want.rows.as_ref().and_then(|rows| rows.columns.as_ref()).map(Location::span);
     vec![
-        (columns, "columns"),
         (of_events, "events"),
         (want.wrap.first().map(Location::span), "wrap"),
         (set(&want.conformal_factor), "conformal_factor"),
@@ -85,7 +84,7 @@ impl LatticeScene {
         match dimension(&lattice) {
             Some(dimension) if dimension <= FEW => false,
             Some(dimension) if dimension <= MOST_OF_FORMULA => {
-                by() && of_formulas(file).iter().all(|(given, _)| given.is_none())
+                by() && columns_of(file).is_none() && of_formulas(file).iter().all(|(given, _)| given.is_none())
             }
             _ => true,
         }
@@ -136,7 +135,7 @@ impl LatticeScene {
         refuse_all(text, of_formulas(file), |name| {
             format!(
                 "`{name}` takes a formula, which has at most {MOST_OF_FORMULA} coordinates; a lattice with more runs with given \
-                 steps of a splitting, of midpoint, gauss_1 or gauss_2, and its rows are the whole state: remove `{name}`"
+                 steps of a splitting, of midpoint, gauss_1 or gauss_2: remove `{name}`"
             )
         })?;
         let [site, bond, sites, names, parameters] = spans_of_lattice(system, table);
@@ -149,9 +148,19 @@ impl LatticeScene {
         let (by, steps) = steps(text, run)?;
         let WantTable { rows, .. } = &file.want;
         let rows = RowTimes::read(text, rows.as_ref(), (start.t, end))?.when(start.t, end);
-        let motion = SiteMotion { rows, ..SiteMotion::new(start, end, by, steps) };
         let Lattice { coordinates, sizes, .. } = lattice;
-        Ok(LatticeScene { system: sparse, motion, coordinates, sizes, text: text.into(), spans, run: run.span() })
+        let names = Names { coordinates: &coordinates, sites: sizes.iter().product() };
+        let (chosen, columns) = match columns_of(file) {
+            Some(columns) => {
+                let (chosen, places): (Vec<String>, Vec<usize>) = names.places(text, columns)?.into_iter().unzip();
+                (Some(chosen), Some(places))
+            }
+            None => (None, None),
+        };
+        let conformal_factor = chosen.iter().flatten().any(|name| name == LOG_FACTOR);
+        let motion = SiteMotion { rows, columns, conformal_factor, ..SiteMotion::new(start, end, by, steps) };
+        let (text, run) = (text.into(), run.span());
+        Ok(LatticeScene { system: sparse, motion, coordinates, sizes, chosen, text, spans, run })
     }
 
     /// The error with the position in the file that it concerns.
@@ -159,18 +168,111 @@ impl LatticeScene {
         explain(&self.text, &self.spans, self.run, error)
     }
 
-    /// The names of the columns of a row: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; with several components
-    /// at a site `x_0`, `y_0`, `x_1`, ...
+    /// The names of the columns of a row, those of the scene or those of the whole state.
     pub fn columns(&self) -> Vec<String> {
-        let sites: usize = self.sizes.iter().product();
-        let names: Vec<String> = match self.coordinates.as_slice() {
-            [name] => (0..sites).map(|i| format!("{name}[{i}]")).collect(),
-            several => (0..sites).flat_map(|i| several.iter().map(move |name| format!("{name}_{i}"))).collect(),
-        };
+        self.chosen.clone().unwrap_or_else(|| self.columns_of_state())
+    }
+
+    /// The plan of the motion in words.
+    ///
+    /// # Errors
+    /// Those of [`SiteMotion::step`].
+    pub fn plan(&self) -> Result<String, RuntimeError> {
+        let SiteMotion { start, end, by, .. } = &self.motion;
+        let ((h, count), sites) = (self.motion.step()?, self.sizes.iter().product::<usize>());
+        let from = start.t;
+        Ok(format!(
+            "{count} steps of {h} by {by}, t = {from} to {end}\n{sites} sites; steps and integrator are as given\n"
+        ))
+    }
+
+    /// Whether the scene chooses columns.
+    pub fn has_columns(&self) -> bool {
+        self.chosen.is_some()
+    }
+
+    /// The names of the columns of the whole state: `t`, `x[0]`, ..., `x'[0]`, ..., `p_x[0]`, ..., `z`, `energy`; with several
+    /// components at a site `x_0`, `y_0`, `x_1`, ...
+    pub fn columns_of_state(&self) -> Vec<String> {
+        let of = Names { coordinates: &self.coordinates, sites: self.sizes.iter().product() };
+        let of = &of;
+        let names: Vec<String> =
+            (0..of.sites).flat_map(|i| of.coordinates.iter().map(move |name| of.component(name, i))).collect();
         let velocities = names.iter().map(|name| velocity_name(name));
         let momenta = names.iter().map(|name| format!("p_{name}"));
         let state = names.iter().cloned().chain(velocities).chain(momenta);
         ["t".to_owned()].into_iter().chain(state).chain(["z", "energy"].map(str::to_owned)).collect()
+    }
+
+    /// Whether the lattice has few enough coordinates to be a formula.
+    pub fn is_a_formula(&self) -> bool {
+        self.system.dimension() <= MOST_OF_FORMULA
+    }
+}
+
+/// The columns that a scene chooses.
+fn columns_of(file: &File) -> Option<&Location<Vec<Location<String>>>> {
+    file.want.rows.as_ref().and_then(|rows| rows.columns.as_ref())
+}
+
+const LOG_FACTOR: &str = "log_factor";
+
+/// The names of the state of a lattice.
+struct Names<'a> {
+    coordinates: &'a [String],
+    sites: usize,
+}
+
+impl Names<'_> {
+    /// The name of a component at a site.
+    fn component(&self, name: &str, site: usize) -> String {
+        if self.coordinates.len() == 1 { format!("{name}[{site}]") } else { format!("{name}_{site}") }
+    }
+
+    /// The place of a column in the row of the whole state.
+    fn place(&self, column: &str) -> Option<usize> {
+        let (d, n) = (self.coordinates.len(), self.coordinates.len() * self.sites);
+        let after = ["z", "energy", LOG_FACTOR].iter().position(|name| *name == column);
+        if let Some(k) = after {
+            return Some(1 + 3 * n + k);
+        }
+        if column == "t" {
+            return Some(0);
+        }
+        let site: usize = column.trim_end_matches(['\'', ']']).rsplit(['[', '_']).next()?.parse().ok()?;
+        let of_site = (site < self.sites).then_some(self.coordinates)?;
+        of_site.iter().enumerate().find_map(|(k, name)| {
+            let name = self.component(name, site);
+            let kinds = [name.clone(), velocity_name(&name), format!("p_{name}")];
+            let kind = kinds.iter().position(|known| known == column)?;
+            Some(1 + kind * n + site * d + k)
+        })
+    }
+
+    /// The columns that a scene chooses, with their places in the row of the whole state.
+    fn places(
+        &self,
+        text: &str,
+        columns: &Location<Vec<Location<String>>>,
+    ) -> Result<Vec<(String, usize)>, SceneError> {
+        if columns.is_empty() {
+            return Err(SceneError::at(text, columns.span(), output::NO_COLUMNS));
+        }
+        let of = |column: &Location<String>| {
+            let name = column.trim();
+            let place = self.place(name).ok_or_else(|| {
+                let (first, last) = (self.coordinates.first().map_or("x", String::as_str), self.sites.saturating_sub(1));
+                let first = self.component(first, last);
+                let message = format!(
+                    "`{name}` is no column; those of a lattice of more than {MOST_OF_FORMULA} coordinates are t, z, energy, {LOG_FACTOR}, and of \
+                     each site such names as {first}, {} and p_{first}: no formulas",
+                    velocity_name(&first)
+                );
+                SceneError::at(text, column.span(), message)
+            })?;
+            Ok((name.to_owned(), place))
+        };
+        columns.iter().map(of).collect()
     }
 }
 

@@ -105,6 +105,8 @@ fn within(text: &str, time: &Location<f64>, name: &str, (t0, end): (f64, f64)) -
     Ok(t)
 }
 
+pub(crate) const NO_COLUMNS: &str = "`columns` is empty; give some columns, or remove `columns` for the whole state";
+
 /// The columns of a row, with their names.
 pub(crate) fn columns(
     text: &str,
@@ -113,11 +115,7 @@ pub(crate) fn columns(
 ) -> Result<Vec<(String, Column)>, SceneError> {
     let Some(columns) = rows.and_then(|rows| rows.columns.as_ref()) else { return Ok(Column::state(formula)) };
     if columns.is_empty() {
-        return Err(SceneError::at(
-            text,
-            columns.span(),
-            "`columns` is empty; give some columns, or remove `columns` for the whole state",
-        ));
+        return Err(SceneError::at(text, columns.span(), NO_COLUMNS));
     }
     let of = |name: &Location<String>| match Column::parse(name, formula) {
         Ok(column) => Ok((name_of(name).to_owned(), column)),

@@ -112,14 +112,12 @@ const KINDS: [Kind; 8] = [
         ends: "x = 0.0\n",
         without: &[
             ("accuracy", NOT_OF_LARGE),
-            ("columns", NOT_OF_LARGE),
             ("events", NOT_OF_LARGE),
             ("terminal events", NOT_OF_LARGE),
             ("resets", NOT_OF_LARGE),
             ("breaks", NOT_OF_LARGE),
             ("tables", NOT_OF_LARGE),
             ("resume", "--resume does not apply to a lattice of many sites"),
-            ("plan", "from 1 to 256"),
             ("check", "from 1 to 256"),
             ("Lyapunov exponents", "from 1 to 256"),
             ("compare", "from 1 to 256"),
@@ -260,5 +258,5 @@ fn kinds_of_systems_and_what_they_can_do() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // It may grow.
-    assert!(works >= 109, "{works} of {cells}");
+    assert!(works >= 111, "{works} of {cells}");
 }

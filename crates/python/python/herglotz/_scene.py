@@ -255,6 +255,9 @@ def _of_system(data, folder, watch):
     t0, start = _start_of(data.get("start", {}), L, data["system"])
     known = {"t", *_names(L)}
     columns = want.get("rows", {}).get("columns", [])
+    # The rows of many sites are the whole state.
+    if columns and "lattice" in data["system"] and L.dimension > _MOST_OF_FORMULA:
+        known |= _state_of_sites(data["system"])
     observe = {_name(text): text for text in columns if _name(text) not in known}
     conformal = want.get("conformal_factor", False) or any(re.search(r"\b(sigma|log_factor)\b", text) for text in columns)
     return solve(
@@ -286,6 +289,14 @@ def _names(L):
         return []
     of = L if isinstance(L, _core.System) else L.system
     return [*of.coordinates, *_core.velocity_names(of.given_coordinates)[1]]
+
+
+def _state_of_sites(given):
+    """The columns of a lattice of many sites."""
+    names, sites = given.get("coordinates", ["x"]), int(np.prod(given["lattice"]["sites"]))
+    one = len(names) == 1
+    names = [f"{name}[{i}]" if one else f"{name}_{i}" for i in range(sites) for name in names]
+    return {"z", "energy", "log_factor", *names, *_core.velocity_names(names)[1], *(f"p_{name}" for name in names)}
 
 
 def _event(given):

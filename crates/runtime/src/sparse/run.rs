@@ -31,16 +31,22 @@ pub struct SiteMotion {
     pub rows: OutputTimes,
     /// Whether rows and the outcome have the logarithm of the conformal factor.
     pub conformal_factor: bool,
+    /// The numbers of a row that are passed on, by their places in the whole row; all of them where this is `None`. The energy
+    /// is computed only where it is among them.
+    pub columns: Option<Vec<usize>>,
 }
 
 impl SiteMotion {
     /// From a start to a time with given steps, with a row at each step.
     pub fn new(start: Start, end: f64, by: AnyIntegrator, steps: Steps) -> Self {
-        SiteMotion { start, end, by, steps, rows: OutputTimes::Every(1), conformal_factor: false }
+        SiteMotion { start, end, by, steps, rows: OutputTimes::Every(1), conformal_factor: false, columns: None }
     }
 
-    /// The length of a step, and the number of steps.
-    fn step(&self) -> Result<(f64, usize), RuntimeError> {
+    /// The length of a step, with its sign, and the number of steps.
+    ///
+    /// # Errors
+    /// [`RuntimeError::Argument`] where the end or the length is not one.
+    pub fn step(&self) -> Result<(f64, usize), RuntimeError> {
         let span = self.end - self.start.t;
         if !(span != 0.0 && span.is_finite()) {
             let why = format!(
@@ -88,6 +94,9 @@ struct SparseRun<'a, 'w> {
     steps_between_polls: usize,
     log_factor: f64,
     last: OwnedState,
+    /// The whole row.
+    all: Vec<f64>,
+    /// The numbers of it that are passed on.
     numbers: Vec<f64>,
     monitor: &'w mut dyn RunMonitor,
 }
@@ -140,9 +149,10 @@ impl SiteSystem {
 fn run(of: &SiteSystem, motion: &SiteMotion, monitor: &mut dyn RunMonitor) -> Result<Outcome, RuntimeError> {
     let (h, count) = motion.step()?;
     check_rows(motion)?;
+    check_columns(of, motion)?;
     let start = initial_state(of, &motion.start)?;
     let stepper = Stepper::new(of, motion.by, h, &start)?;
-    let numbers = Vec::with_capacity(4 + 3 * of.dimension());
+    let all = Vec::with_capacity(width_of(of, motion));
     let mut run = SparseRun {
         of,
         motion,
@@ -153,7 +163,8 @@ fn run(of: &SiteSystem, motion: &SiteMotion, monitor: &mut dyn RunMonitor) -> Re
         steps_between_polls: 1,
         log_factor: 0.0,
         last: start,
-        numbers,
+        all,
+        numbers: Vec::new(),
         monitor,
     };
     let status = match run.run() {
@@ -182,6 +193,28 @@ fn check_rows(motion: &SiteMotion) -> Result<(), RuntimeError> {
         last = *time;
     }
     Ok(())
+}
+
+/// The number of numbers of a whole row.
+fn width_of(of: &SiteSystem, motion: &SiteMotion) -> usize {
+    3 + 3 * of.dimension() + usize::from(motion.conformal_factor)
+}
+
+/// The place of the energy in a whole row.
+fn place_of_energy(of: &SiteSystem) -> usize {
+    2 + 3 * of.dimension()
+}
+
+/// Checks the places of the columns.
+fn check_columns(of: &SiteSystem, motion: &SiteMotion) -> Result<(), RuntimeError> {
+    let width = width_of(of, motion);
+    match motion.columns.iter().flatten().find(|place| **place >= width) {
+        Some(place) => {
+            let why = format!("has the place {place}; a row has {width} numbers, with places from 0");
+            Err(RuntimeError::argument("columns", why))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The start, validated.
@@ -306,14 +339,24 @@ impl SparseRun<'_, '_> {
     /// Sets the numbers of a row of the stored state.
     fn set_numbers(&mut self, log_factor: f64) -> Result<(), Ended> {
         let OwnedState { t, q, v, z } = &self.last;
-        let energy = self.of.energy(&self.last)?;
-        self.numbers.clear();
-        self.numbers.push(*t);
-        self.of.outward(q, &mut self.numbers);
-        self.of.outward(v, &mut self.numbers);
-        self.of.outward(&self.of.momenta(v), &mut self.numbers);
-        self.numbers.extend([*z, energy]);
-        self.numbers.extend(self.motion.conformal_factor.then_some(log_factor));
+        let columns = self.motion.columns.as_deref();
+        let wants_energy = columns.is_none_or(|columns| columns.contains(&place_of_energy(self.of)));
+        let energy = if wants_energy { self.of.energy(&self.last)? } else { f64::NAN };
+        let all = &mut self.all;
+        all.clear();
+        all.push(*t);
+        self.of.outward(q, all);
+        self.of.outward(v, all);
+        self.of.outward(&self.of.momenta(v), all);
+        all.extend([*z, energy]);
+        all.extend(self.motion.conformal_factor.then_some(log_factor));
+        match columns {
+            Some(columns) => {
+                self.numbers.clear();
+                self.numbers.extend(columns.iter().map(|place| self.all[*place]));
+            }
+            None => std::mem::swap(&mut self.numbers, &mut self.all),
+        }
         Ok(())
     }
 
