@@ -635,7 +635,7 @@ fn wrong_lattices_are_refused() {
         (
             "every = 1.0",
             "columns = [\"x'[40]\"]",
-            "are t, z, energy, log_factor, and of each site such names as x[39], x'[39] and p_x[39]",
+            "line 16, column 12: `x'[40]` is no column; those of a lattice of more than 256 coordinates are t, z, energy, log_factor, and of each site such names as x[39], x'[39] and p_x[39], without formulas",
         ),
         ("every = 1.0", "columns = []", "line 16, column 11: `columns` is empty"),
     ];

@@ -265,7 +265,7 @@ impl Names<'_> {
                 let first = self.component(first, last);
                 let message = format!(
                     "`{name}` is no column; those of a lattice of more than {MOST_OF_FORMULA} coordinates are t, z, energy, {LOG_FACTOR}, and of \
-                     each site such names as {first}, {} and p_{first}: no formulas",
+                     each site such names as {first}, {} and p_{first}, without formulas",
                     velocity_name(&first)
                 );
                 SceneError::at(text, column.span(), message)
