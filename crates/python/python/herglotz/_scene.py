@@ -294,9 +294,8 @@ def _names(L):
 def _state_of_sites(given):
     """The columns of a lattice of many sites."""
     names, sites = given.get("coordinates", ["x"]), int(np.prod(given["lattice"]["sites"]))
-    one = len(names) == 1
-    names = [f"{name}[{i}]" if one else f"{name}_{i}" for i in range(sites) for name in names]
-    return {"z", "energy", "log_factor", *names, *_core.velocity_names(names)[1], *(f"p_{name}" for name in names)}
+    forms = ["{}[{}]", "{}'[{}]", "p_{}[{}]"] if len(names) == 1 else ["{}_{}", "{}_{}'", "p_{}_{}"]
+    return {"z", "energy", "log_factor", *(form.format(name, i) for form in forms for name in names for i in range(sites))}
 
 
 def _event(given):
