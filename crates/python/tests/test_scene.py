@@ -90,8 +90,9 @@ def test_columns_of_many_sites_are_those_of_the_state(tmp_path):
     sol = hz.run(with_columns(["t", "x[299]", "x'[0]", "p_x[7]", "energy", "log_factor"]))
     # gamma = -0.1.
     assert sol["q[299]"].shape == (3,) and np.allclose(sol["log_factor"], -0.1 * sol["t"], rtol=0, atol=1e-14)
-    with pytest.raises(ValueError, match="accuracy, events and columns"):
-        hz.run(with_columns(["t", "2*x[0]"]))
+    for wrong in ["2*x[0]", "x[300]"]:
+        with pytest.raises(ValueError, match="accuracy, events and columns"):
+            hz.run(with_columns(["t", wrong]))
 
 
 def test_bodies_refuse_what_does_not_apply(tmp_path):

@@ -220,7 +220,8 @@ impl<L: Lagrangian<N>, C: Constraint<N, M>, const N: usize, const M: usize> Drag
         let mut q;
         loop {
             q = q0 + self.velocity(t, (&q0, &p), vary) * T::from(h);
-            // The matrix of the first iteration is at the position without constraints, which is near: it is kept unless that is slow.
+            // The matrix of the first iteration is at the position without constraints, which is near: it is kept
+            // unless that is slow.
             let (mut c, solver) = match known.take() {
                 Some(solver) => (vary.constraint_values(&self.constraint, &q), solver),
                 None => {

@@ -4,8 +4,8 @@ use crate::StepError;
 use contact_geom::Scalar;
 use contact_geom::nalgebra::SMatrix;
 
-/// A square matrix of a size that is known at run time, with its LU factorisation by partial pivoting, rows scaled to their largest entry, since momenta and
-/// constraints have different units. The memory is allocated once.
+/// A square matrix of a size that is known at run time, with its LU factorisation by partial pivoting, rows scaled to
+/// their largest entry, since momenta and constraints have different units. The memory is allocated once.
 #[derive(Clone, Debug)]
 pub(super) struct LinearSystem {
     n: usize,

@@ -261,12 +261,12 @@ impl Names<'_> {
         let of = |column: &Location<String>| {
             let name = column.trim();
             let place = self.place(name).ok_or_else(|| {
-                let (first, last) = (self.coordinates.first().map_or("x", String::as_str), self.sites.saturating_sub(1));
-                let first = self.component(first, last);
+                let name_of_first = self.coordinates.first().map_or("x", String::as_str);
+                let last = self.component(name_of_first, self.sites.saturating_sub(1));
                 let message = format!(
                     "`{name}` is no column; those of a lattice of more than {MOST_OF_FORMULA} coordinates are t, z, energy, {LOG_FACTOR}, and of \
-                     each site such names as {first}, {} and p_{first}, without formulas",
-                    velocity_name(&first)
+                     each site such names as {last}, {} and p_{last}, without formulas",
+                    velocity_name(&last)
                 );
                 SceneError::at(text, column.span(), message)
             })?;

@@ -255,9 +255,9 @@ def _of_system(data, folder, watch):
     t0, start = _start_of(data.get("start", {}), L, data["system"])
     known = {"t", *_names(L)}
     columns = want.get("rows", {}).get("columns", [])
-    # The rows of many sites are the whole state.
-    if columns and "lattice" in data["system"] and L.dimension > _MOST_OF_FORMULA:
-        known |= _state_of_sites(data["system"])
+    if "lattice" in data["system"] and L.dimension > _MOST_OF_FORMULA:
+        # The rows of many sites are the whole state.
+        known |= {text for text in columns if _is_of_sites(text.strip(), data["system"])}
     observe = {_name(text): text for text in columns if _name(text) not in known}
     conformal = want.get("conformal_factor", False) or any(re.search(r"\b(sigma|log_factor)\b", text) for text in columns)
     return solve(
@@ -291,11 +291,13 @@ def _names(L):
     return [*of.coordinates, *_core.velocity_names(of.given_coordinates)[1]]
 
 
-def _state_of_sites(given):
-    """The columns of a lattice of many sites."""
-    names, sites = given.get("coordinates", ["x"]), int(np.prod(given["lattice"]["sites"]))
+def _is_of_sites(column, given):
+    """Whether a column is one of a lattice of many sites."""
+    names, index = given.get("coordinates", ["x"]), re.search(r"(\d+)\]?'?$", column)
+    if index is None or int(index[1]) >= np.prod(given["lattice"]["sites"]):
+        return column in ("z", "energy", "log_factor")
     forms = ["{}[{}]", "{}'[{}]", "p_{}[{}]"] if len(names) == 1 else ["{}_{}", "{}_{}'", "p_{}_{}"]
-    return {"z", "energy", "log_factor", *(form.format(name, i) for form in forms for name in names for i in range(sites))}
+    return any(form.format(name, int(index[1])) == column for form in forms for name in names)
 
 
 def _event(given):
